@@ -1,0 +1,84 @@
+//! Finds PETSc and MPI and generates the raw PETSc bindings read from `ffi/petsc.h`.
+//!
+//! Search order: environment (`PKG_CONFIG_PATH`, `MPICC`), pkg-config, then MPI's compiler
+//! wrapper. When something is missing, the build stops with the places looked at and the
+//! Debian package that provides it.
+
+use std::env;
+use std::path::PathBuf;
+
+const PETSC_VERSIONS: (&str, &str) = ("3.18", "3.19");
+
+fn main() {
+    println!("cargo:rerun-if-changed=ffi/petsc.h");
+    println!("cargo:rerun-if-changed=build.rs");
+
+    let petsc = ["petsc", "PETSc"]
+        .iter()
+        .find_map(|name| {
+            pkg_config::Config::new()
+                .range_version(PETSC_VERSIONS.0..PETSC_VERSIONS.1)
+                .probe(name)
+                .ok()
+        })
+        .unwrap_or_else(|| {
+            missing(
+                "PETSc (real scalars, 32-bit indices, 3.18.x)",
+                "libpetsc-real-dev",
+                "pkg-config modules `petsc` and `PETSc`; set PKG_CONFIG_PATH to add a folder",
+            )
+        });
+    let mpi = build_probe_mpi::probe().unwrap_or_else(|_| {
+        missing(
+            "MPI",
+            "libopenmpi-dev openmpi-bin",
+            "the compiler wrapper named by MPICC, `mpicc` on PATH, pkg-config `mpich`/`openmpi`",
+        )
+    });
+    if pkg_config::Config::new().cargo_metadata(false).probe("metis").is_err()
+        && !["/usr/include/metis.h", "/usr/local/include/metis.h"]
+            .iter()
+            .any(|path| std::path::Path::new(path).exists())
+    {
+        missing::<()>(
+            "METIS",
+            "libmetis-dev",
+            "pkg-config module `metis`, /usr/include, /usr/local/include",
+        );
+    }
+
+    let mut builder = bindgen::Builder::default()
+        .header("ffi/petsc.h")
+        .use_core()
+        .layout_tests(false)
+        .generate_comments(false)
+        .default_enum_style(bindgen::EnumVariation::Consts)
+        .prepend_enum_name(false)
+        .allowlist_function("(Petsc|PETSC_|Vec|Mat|KSP|PC|SNES|IS).*")
+        .allowlist_type("(Petsc|Vec|Mat|KSP|PC|SNES|IS|Insert|Norm).*")
+        .allowlist_var("(PETSC|MAT|VEC|KSP|PC|SNES|IS_|INSERT|ADD|NORM|SUBSET|SAME|DIFFERENT).*")
+        .blocklist_type("MPI_.*|ompi_.*")
+        .blocklist_function("P?MPI_.*")
+        .blocklist_var("MPI_.*|ompi_.*|FP_.*")
+        .raw_line(
+            "pub use mpi_sys::{MPI_Comm, MPI_Datatype, MPI_Op, MPI_Request, MPI_Group, \
+             MPI_Status, MPI_Win, MPI_Info, MPI_File, MPI_Offset};",
+        );
+    for path in petsc.include_paths.iter().chain(&mpi.include_paths) {
+        builder = builder.clang_arg(format!("-I{}", path.display()));
+    }
+    let bindings = builder
+        .generate()
+        .unwrap_or_else(|error| panic!("bindgen could not read ffi/petsc.h: {error}"));
+    let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets OUT_DIR")).join("petsc.rs");
+    bindings
+        .write_to_file(&out)
+        .unwrap_or_else(|error| panic!("cannot write {}: {error}", out.display()));
+}
+
+fn missing<T>(what: &str, package: &str, looked: &str) -> T {
+    panic!(
+        "\n{what} was not found.\n  looked in: {looked}\n  on Debian: apt-get install {package}\n  \
+         (or run `make setup`)\n"
+    )
+}

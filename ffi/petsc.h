@@ -1,0 +1,2 @@
+/* What bindgen reads: the SNES header brings in Vec, Mat, PC and KSP. */
+#include <petscsnes.h>

@@ -1,0 +1,374 @@
+//! The deck as typed data: what every other module reads. Units are SI unless said otherwise.
+//!
+//! Vectors that follow the problem's dimension are `Vec<f64>` of length `Deck::dimension`,
+//! already checked; enums carry the deck's own words in `name()`.
+
+use std::path::PathBuf;
+
+use super::expression::Expression;
+use super::shape::Shape;
+
+/// A complete, checked input deck.
+#[derive(Debug, Clone)]
+pub struct Deck {
+    pub title: String,
+    /// 2 (plane strain) or 3, from the grid.
+    pub dimension: usize,
+    /// Folder of the deck: relative paths inside it start here.
+    pub directory: PathBuf,
+    pub analysis: Analysis,
+    pub method: Method,
+    pub ghost: Option<Ghost>,
+    pub grid: Grid,
+    pub materials: Vec<Material>,
+    pub bodies: Vec<Body>,
+    pub boundaries: Vec<Boundary>,
+    pub loads: Vec<Load>,
+    pub verify: Vec<Verify>,
+    pub output: Output,
+    pub parallel: Parallel,
+    /// `[conditioning] displacement`, m: total rigid motion over the analysis.
+    pub conditioning_displacement: Option<Vec<f64>>,
+    /// `[petsc]`: option name without its dash, and value ("" for a bare flag).
+    pub petsc: Vec<(String, String)>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AnalysisType {
+    QuasiStatic,
+    Explicit,
+    ImplicitDynamic,
+    Conditioning,
+}
+
+#[derive(Debug, Clone)]
+pub struct Analysis {
+    pub kind: AnalysisType,
+    /// Equal load steps or time steps; `None` only with `cfl`.
+    pub steps: Option<usize>,
+    /// s; dynamics only.
+    pub duration: Option<f64>,
+    /// Fraction of the stability limit; explicit only, instead of `steps`.
+    pub cfl: Option<f64>,
+    /// Normalised residual (Lagrangian eq. 40), default 1e-9.
+    pub tolerance: f64,
+    /// Evaluations of the residual allowed in one step, the first at zero displacement included.
+    pub max_iterations: usize,
+    pub on_failure: OnFailure,
+    /// With `on_failure = "cut"`: the smallest step, as a fraction of the nominal one (default 1/1024).
+    pub smallest_step: f64,
+    pub inverted_iterates: InvertedIterates,
+    /// Implicit dynamics: Newmark beta, gamma; or HHT alpha in [-1/3, 0] which sets both.
+    pub newmark_beta: f64,
+    pub newmark_gamma: f64,
+    pub hht_alpha: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum OnFailure {
+    Stop,
+    Cut,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum InvertedIterates {
+    Reject,
+    Allow,
+}
+
+#[derive(Debug, Clone)]
+pub struct Method {
+    pub basis: Basis,
+    pub domain_update: DomainUpdate,
+    pub frame: Frame,
+    pub mass: Mass,
+    pub stress_update: StressUpdate,
+    /// FLIP share: 1 is FLIP, 0 is PIC.
+    pub flip: f64,
+    /// `velocity_update = "xpic"` with `xpic_order = m`; `None` otherwise.
+    pub xpic: Option<usize>,
+    /// A node whose summed basis weight is below this fraction of the largest one is held at
+    /// zero and left out of the residual (default 1e-8 without Ghost stiffness, 0 with it).
+    pub drop_below: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    Mpm,
+    Gimp,
+    Cpdi1,
+    Cpdi2,
+}
+
+/// How a GIMP domain follows the deformation (Lagrangian §6.4).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DomainUpdate {
+    None,
+    Det,
+    Normal,
+    Stretch,
+    Corners,
+    NormalCorrected,
+    NormalIncremental,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frame {
+    Previous,
+    Updated,
+    Total,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mass {
+    Consistent,
+    Lumped,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StressUpdate {
+    Usf,
+    Usl,
+    Musl,
+}
+
+/// Ghost stabilisation parameters. Absolute values win over factors.
+#[derive(Debug, Clone)]
+pub struct Ghost {
+    /// gamma_K, Pa.
+    pub stiffness: Option<f64>,
+    /// gamma_K as a multiple of each body's Young's modulus.
+    pub stiffness_factor: Option<f64>,
+    /// gamma_M, kg/m3.
+    pub mass: Option<f64>,
+    /// gamma_M as a multiple of each body's density.
+    pub mass_factor: Option<f64>,
+    pub scaling: GhostScaling,
+}
+
+/// Scale of the face matrix: numerics of the default and of the papers' tables differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GhostScaling {
+    ScaleFree,
+    Literal,
+    Published,
+}
+
+#[derive(Debug, Clone)]
+pub enum Grid {
+    Lattice(LatticeGrid),
+    Mesh(MeshGrid),
+}
+
+#[derive(Debug, Clone)]
+pub struct LatticeGrid {
+    /// m
+    pub origin: Vec<f64>,
+    /// m, one per axis
+    pub spacing: Vec<f64>,
+    /// cells per axis
+    pub cells: Vec<usize>,
+}
+
+#[derive(Debug, Clone)]
+pub struct MeshGrid {
+    pub source: MeshSource,
+    pub motion: MeshMotion,
+}
+
+#[derive(Debug, Clone)]
+pub enum MeshSource {
+    /// Gmsh 4.1 file, absolute or relative to the deck's folder (already joined).
+    File(PathBuf),
+    /// Circular (inner = [r, r]) or elliptic hole in a disc of radius `outer`, m.
+    /// `grading` >= 1 refines around the ends of the long axis (1: uniform).
+    Annulus {
+        inner: [f64; 2],
+        outer: f64,
+        radial: usize,
+        around: usize,
+        element: Element,
+        grading: f64,
+    },
+    Box {
+        min: Vec<f64>,
+        max: Vec<f64>,
+        cells: Vec<usize>,
+        element: Element,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Element {
+    Tri3,
+    Quad4,
+    Tet4,
+    Hex8,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum MeshMotion {
+    Fixed,
+    /// Rigid rotation with the named boundary tag's prescribed rotation.
+    RotateWith(String),
+    /// Nodes follow the computed displacement along these axes (0, 1, 2) only.
+    Follow(Vec<usize>),
+    /// Nodes follow the material wholly: updated-Lagrangian FEM with `gauss` seeding.
+    Material,
+}
+
+#[derive(Debug, Clone)]
+pub struct Material {
+    pub name: String,
+    pub model: MaterialModel,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MaterialModel {
+    /// Hencky elasticity: Pa, -.
+    Hencky { young: f64, poisson: f64 },
+    /// Hencky elasticity with perfect von Mises plasticity; `yield_stress` is rho_y, Pa,
+    /// the radius sqrt(2 J2) of the Kirchhoff stress (Lagrangian eq. 43).
+    VonMises { young: f64, poisson: f64, yield_stress: f64 },
+}
+
+#[derive(Debug, Clone)]
+pub struct Body {
+    pub name: String,
+    /// Index into `Deck::materials`.
+    pub material: usize,
+    /// kg/m3, initial
+    pub density: f64,
+    pub source: BodySource,
+    /// m/s, one expression per axis of X, Y, Z.
+    pub velocity: Vec<Expression>,
+}
+
+#[derive(Debug, Clone)]
+pub enum BodySource {
+    Shape {
+        shape: Shape,
+        seeding: Seeding,
+    },
+    /// csv with header x,y[,z],volume[,vx,vy,vz]; path already joined to the deck's folder.
+    File(PathBuf),
+    /// All cells of a mesh, or those with this physical tag.
+    MeshCells {
+        tag: Option<String>,
+        seeding: Seeding,
+    },
+}
+
+#[derive(Debug, Clone)]
+pub enum Seeding {
+    /// Equal sub-cells per grid cell, per axis; on a mesh the equivalent number per element.
+    PerCell(Vec<usize>),
+    /// Points at offset + (i, j, k) * spacing, m, kept where the centre is inside the shape;
+    /// volume spacing^D. Offset is a position in the shape's local frame (before `translate`).
+    Lattice { spacing: f64, offset: Vec<f64> },
+    /// Gauss points per axis and cell.
+    Gauss(usize),
+}
+
+#[derive(Debug, Clone)]
+pub struct Boundary {
+    pub name: String,
+    pub place: Place,
+    /// Component -> held at zero.
+    pub fix: Vec<usize>,
+    /// (component, total displacement over the analysis, m, expression of X, Y, Z, s, t).
+    /// A value without `s` or `t` is ramped linearly with the load factor.
+    pub displacement: Vec<(usize, Expression)>,
+    /// Total rigid rotation over the analysis.
+    pub rotation: Option<Rotation>,
+}
+
+#[derive(Debug, Clone)]
+pub struct Rotation {
+    /// m
+    pub centre: Vec<f64>,
+    /// Total, counter-clockwise about z.
+    pub degrees: f64,
+}
+
+#[derive(Debug, Clone)]
+pub enum Place {
+    /// A face of the lattice: axis and whether it is the upper end.
+    /// left/right: x; bottom/top: y; back/front: z.
+    Side { axis: usize, upper: bool },
+    /// Nodes inside or on a box (tolerance 1e-9 of the grid spacing), in start positions.
+    Box { min: Vec<f64>, max: Vec<f64> },
+    /// Nodes of a mesh tag.
+    Tag(String),
+    /// All nodes of the cells that hold the outermost points of a body (Lagrangian §7.2),
+    /// recomputed every step.
+    CellsOf { body: usize },
+}
+
+#[derive(Debug, Clone)]
+pub enum Load {
+    /// Total force, N (2D: N/m), shared equally by the points nearest to the given places.
+    Point { body: usize, nearest: Vec<Vec<f64>>, force: Vec<f64> },
+    /// m/s2
+    Gravity(Vec<f64>),
+    /// N/m3 of *initial* volume, expressions of X, Y, Z, x, y, z, s, t.
+    /// Without `s` or `t` it is ramped linearly in quasi-static runs.
+    BodyForce(Vec<Expression>),
+    /// Body force (N per initial volume) that makes this displacement field exact: one expression
+    /// per axis of X, Y, Z, s (manufactured solution).
+    Manufactured(Vec<Expression>),
+}
+
+#[derive(Debug, Clone)]
+pub struct Verify {
+    pub name: String,
+    /// e.g. `stress.yy`, `displacement.x`, `displacement`, `velocity.x`, `J`.
+    pub field: String,
+    /// One expression, or one per component for a vector field.
+    pub exact: Vec<Expression>,
+    pub norm: VerifyNorm,
+    pub scale: f64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VerifyNorm {
+    /// sum |a - b| V0 / (scale V0_total), Lagrangian eq. 42.
+    VolumeL1,
+    /// sqrt(sum |a - b|^2 V0 / V0_total) / scale
+    VolumeL2,
+    /// max |a - b| / scale
+    Max,
+}
+
+#[derive(Debug, Clone)]
+pub struct Output {
+    pub every: Every,
+    /// Point fields to write.
+    pub fields: Vec<String>,
+    pub checkpoint: Option<Checkpoint>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Every {
+    Steps(usize),
+    /// s of simulated time
+    Seconds(f64),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Checkpoint {
+    /// Steps between checkpoints, if any.
+    pub every: Option<usize>,
+    /// Minutes of wall time between checkpoints, if any.
+    pub minutes: Option<f64>,
+    /// How many to keep (default 2).
+    pub keep: usize,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parallel {
+    /// Cells per side of a lattice brick, the unit of partition; `None`: chosen by size.
+    pub brick: Option<usize>,
+    /// Repartition when max/mean cost exceeds this (default 1.2); 0 switches it off.
+    pub rebalance_above: f64,
+}

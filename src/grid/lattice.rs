@@ -1,0 +1,111 @@
+//! Equal axis-aligned cells; nothing is stored per cell. Indices run x fastest.
+
+/// A regular grid of boxes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lattice<const D: usize> {
+    /// Lower corner, m.
+    pub origin: [f64; D],
+    /// Cell size per axis, m.
+    pub spacing: [f64; D],
+    /// Cells per axis.
+    pub cells: [usize; D],
+}
+
+/// Offsets of a cell's nodes from its lowest one, counter-clockwise, then upward (hex8 order).
+pub const CELL_CORNERS: [[usize; 3]; 8] =
+    [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
+
+impl<const D: usize> Lattice<D> {
+    /// Nodes per axis.
+    pub fn nodes(&self) -> [usize; D] {
+        self.cells.map(|n| n + 1)
+    }
+
+    pub fn node_count(&self) -> usize {
+        self.nodes().iter().product()
+    }
+
+    pub fn cell_count(&self) -> usize {
+        self.cells.iter().product()
+    }
+
+    pub fn node_at(&self, index: [usize; D]) -> usize {
+        flatten(index, self.nodes())
+    }
+
+    pub fn node_index(&self, node: usize) -> [usize; D] {
+        unflatten(node, self.nodes())
+    }
+
+    pub fn cell_at(&self, index: [usize; D]) -> usize {
+        flatten(index, self.cells)
+    }
+
+    pub fn cell_index(&self, cell: usize) -> [usize; D] {
+        unflatten(cell, self.cells)
+    }
+
+    /// Coordinates of a node, m.
+    pub fn node_position(&self, node: usize) -> [f64; D] {
+        let index = self.node_index(node);
+        std::array::from_fn(|a| self.origin[a] + self.spacing[a] * index[a] as f64)
+    }
+
+    /// Position in units of cells along one axis.
+    pub fn scaled(&self, axis: usize, x: f64) -> f64 {
+        (x - self.origin[axis]) / self.spacing[axis]
+    }
+
+    /// The cell that holds `x` (half-open; the grid's upper edge is closed), `None` outside.
+    pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
+        let mut index = [0; D];
+        for axis in 0..D {
+            let t = self.scaled(axis, x[axis]);
+            let n = self.cells[axis];
+            if !(t >= 0.0 && t <= n as f64) {
+                return None;
+            }
+            index[axis] = (t as usize).min(n - 1);
+        }
+        Some(self.cell_at(index))
+    }
+
+    /// Appends the cell's nodes in hex8 order.
+    pub fn cell_nodes(&self, cell: usize, out: &mut Vec<usize>) {
+        let low = self.cell_index(cell);
+        for corner in CELL_CORNERS.iter().take(1 << D) {
+            out.push(self.node_at(std::array::from_fn(|a| low[a] + corner[a])));
+        }
+    }
+
+    /// Appends the cells across each face that lies inside the grid, -x, +x, -y, ...
+    pub fn face_neighbours(&self, cell: usize, out: &mut Vec<usize>) {
+        let index = self.cell_index(cell);
+        let mut stride = 1;
+        for axis in 0..D {
+            if index[axis] > 0 {
+                out.push(cell - stride);
+            }
+            if index[axis] + 1 < self.cells[axis] {
+                out.push(cell + stride);
+            }
+            stride *= self.cells[axis];
+        }
+    }
+}
+
+fn flatten<const D: usize>(index: [usize; D], counts: [usize; D]) -> usize {
+    let mut flat = 0;
+    for axis in (0..D).rev() {
+        flat = flat * counts[axis] + index[axis];
+    }
+    flat
+}
+
+fn unflatten<const D: usize>(mut flat: usize, counts: [usize; D]) -> [usize; D] {
+    std::array::from_fn(|axis| {
+        let i = flat % counts[axis];
+        flat /= counts[axis];
+        i
+    })
+}

@@ -1,0 +1,213 @@
+//! Material points: what the body carries from step to step (struct of arrays, one rank's share).
+//!
+//! | file | idea |
+//! |---|---|
+//! | `mod.rs` | the fields, and how a point is packed, moved and reordered |
+//! | `seed.rs` | deck bodies -> points |
+//! | `sort.rs` | points in the order of their cells |
+
+use nalgebra::Matrix3;
+
+/// Declares the struct of arrays and everything that must treat each field alike: packing for
+/// migration and checkpoints, reordering, removal. A field is an array of `f64` words per point.
+macro_rules! point_fields {
+    ($( $(#[$doc:meta])* $name:ident : $type:ty, $words:expr );* $(;)?) => {
+        /// One rank's material points. `D` is the dimension of space; stress and deformation
+        /// are always three-dimensional (plane strain for `D = 2`).
+        #[derive(Debug, Clone, Default)]
+        pub struct Points<const D: usize> {
+            /// Stable identity over the whole run and over any number of ranks.
+            pub id: Vec<u64>,
+            /// Index into the deck's bodies.
+            pub body: Vec<u32>,
+            $( $(#[$doc])* pub $name: Vec<$type>, )*
+        }
+
+        impl<const D: usize> Points<D> {
+            /// Name and words per point of every floating-point field, in packing order.
+            pub fn field_words() -> Vec<(&'static str, usize)> {
+                vec![$( (stringify!($name), $words) ),*]
+            }
+
+            /// Words of one packed point: id, body, then the fields.
+            pub fn record_words() -> usize { 2 $( + $words )* }
+
+            /// Appends point `p` to `out` as words; integers travel as their bits.
+            pub fn pack(&self, p: usize, out: &mut Vec<f64>) {
+                out.push(f64::from_bits(self.id[p]));
+                out.push(f64::from_bits(u64::from(self.body[p])));
+                $( self.$name[p].write_words(out); )*
+            }
+
+            /// Appends the point held in `words` (length [`Self::record_words`]).
+            pub fn unpack(&mut self, words: &[f64]) {
+                self.id.push(words[0].to_bits());
+                self.body.push(words[1].to_bits() as u32);
+                let mut rest = &words[2..];
+                $( self.$name.push(<$type as Words>::read_words(&mut rest)); )*
+            }
+
+            /// Keeps the points `order[0], order[1], ...` in that order and drops the others.
+            pub fn select(&mut self, order: &[usize]) {
+                self.id = order.iter().map(|&p| self.id[p]).collect();
+                self.body = order.iter().map(|&p| self.body[p]).collect();
+                $( self.$name = order.iter().map(|&p| self.$name[p]).collect(); )*
+            }
+
+            /// Appends field `name` of point `p` to `out`; false if there is no such field.
+            pub fn field_of(&self, name: &str, p: usize, out: &mut Vec<f64>) -> bool {
+                match name {
+                    $( stringify!($name) => { self.$name[p].write_words(out); true } )*
+                    _ => false,
+                }
+            }
+        }
+    };
+}
+
+point_fields! {
+    /// x, m
+    position: [f64; D], D;
+    /// X, m
+    position_initial: [f64; D], D;
+    /// V0, m3 (m2 in plane strain)
+    volume_initial: f64, 1;
+    /// kg (kg/m in plane strain), constant
+    mass: f64, 1;
+    /// v, m/s
+    velocity: [f64; D], D;
+    /// a, m/s2 (implicit dynamics)
+    acceleration: [f64; D], D;
+    /// F at the end of the last finished step
+    deformation_gradient: Matrix3<f64>, 9;
+    /// Elastic left Cauchy-Green strain b_e at the end of the last finished step
+    elastic_left_cauchy_green: Matrix3<f64>, 9;
+    /// Kirchhoff stress tau, Pa, at the end of the last finished step
+    kirchhoff_stress: Matrix3<f64>, 9;
+    /// Accumulated plastic strain: sum of the norms of the plastic log-strain increments
+    plastic_strain: f64, 1;
+    /// Plastic dissipation, J per unit of initial volume
+    dissipation: f64, 1;
+    /// Half lengths l_p of the GIMP domain, m (for mpm: V^(1/D)/2)
+    half_length: [f64; D], D;
+    /// Half lengths at the start, m
+    half_length_initial: [f64; D], D;
+    /// Point force held by the point at full load, N
+    point_force: [f64; D], D;
+    /// Corners of the CPDI2 domain (2D: 4, counter-clockwise; 3D: 8, hex8 order), m;
+    /// zero for the other bases
+    corners: [[f64; D]; 8], 8 * D;
+}
+
+impl<const D: usize> Points<D> {
+    pub fn len(&self) -> usize {
+        self.id.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.id.is_empty()
+    }
+
+    /// V = det F V0 of the last finished step, m3.
+    pub fn volume(&self, p: usize) -> f64 {
+        self.deformation_gradient[p].determinant() * self.volume_initial[p]
+    }
+
+    /// Appends a point at rest and unstrained. `half_length` is that of its rectangular domain.
+    pub fn push_unstrained(
+        &mut self,
+        id: u64,
+        body: u32,
+        position: [f64; D],
+        volume: f64,
+        density: f64,
+        half_length: [f64; D],
+    ) {
+        self.id.push(id);
+        self.body.push(body);
+        self.position.push(position);
+        self.position_initial.push(position);
+        self.volume_initial.push(volume);
+        self.mass.push(density * volume);
+        self.velocity.push([0.0; D]);
+        self.acceleration.push([0.0; D]);
+        self.deformation_gradient.push(Matrix3::identity());
+        self.elastic_left_cauchy_green.push(Matrix3::identity());
+        self.kirchhoff_stress.push(Matrix3::zeros());
+        self.plastic_strain.push(0.0);
+        self.dissipation.push(0.0);
+        self.half_length.push(half_length);
+        self.half_length_initial.push(half_length);
+        self.point_force.push([0.0; D]);
+        self.corners.push(rectangle_corners(position, half_length));
+    }
+}
+
+/// Corners of an axis-aligned domain: 2D counter-clockwise from (-,-), 3D in hex8 order.
+pub fn rectangle_corners<const D: usize>(x: [f64; D], half: [f64; D]) -> [[f64; D]; 8] {
+    const SIGNS: [[f64; 3]; 8] = [
+        [-1.0, -1.0, -1.0],
+        [1.0, -1.0, -1.0],
+        [1.0, 1.0, -1.0],
+        [-1.0, 1.0, -1.0],
+        [-1.0, -1.0, 1.0],
+        [1.0, -1.0, 1.0],
+        [1.0, 1.0, 1.0],
+        [-1.0, 1.0, 1.0],
+    ];
+    let mut corners = [[0.0; D]; 8];
+    for (corner, sign) in corners.iter_mut().zip(&SIGNS).take(1 << D) {
+        for axis in 0..D {
+            corner[axis] = x[axis] + sign[axis] * half[axis];
+        }
+    }
+    corners
+}
+
+/// A field's value as `f64` words.
+trait Words: Sized {
+    fn write_words(&self, out: &mut Vec<f64>);
+    fn read_words(words: &mut &[f64]) -> Self;
+}
+
+impl Words for f64 {
+    fn write_words(&self, out: &mut Vec<f64>) {
+        out.push(*self);
+    }
+    fn read_words(words: &mut &[f64]) -> Self {
+        let value = words[0];
+        *words = &words[1..];
+        value
+    }
+}
+
+impl<const D: usize> Words for [f64; D] {
+    fn write_words(&self, out: &mut Vec<f64>) {
+        out.extend_from_slice(self);
+    }
+    fn read_words(words: &mut &[f64]) -> Self {
+        std::array::from_fn(|_| f64::read_words(words))
+    }
+}
+
+impl<const D: usize> Words for [[f64; D]; 8] {
+    fn write_words(&self, out: &mut Vec<f64>) {
+        for row in self {
+            out.extend_from_slice(row);
+        }
+    }
+    fn read_words(words: &mut &[f64]) -> Self {
+        std::array::from_fn(|_| <[f64; D]>::read_words(words))
+    }
+}
+
+impl Words for Matrix3<f64> {
+    fn write_words(&self, out: &mut Vec<f64>) {
+        out.extend_from_slice(self.as_slice());
+    }
+    fn read_words(words: &mut &[f64]) -> Self {
+        let value = Matrix3::from_column_slice(&words[..9]);
+        *words = &words[9..];
+        value
+    }
+}
