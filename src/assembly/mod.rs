@@ -1,1 +1,24 @@
-//! (see lib.rs)
+//! From points to the distributed system of equations (Ghost Figure 1 b, c).
+//!
+//! | file | idea |
+//! |---|---|
+//! | `populated.rs` | which cells hold material, and whose |
+//! | `numbering.rs` | equations over active nodes, contiguous by rank |
+//! | `pattern.rs` | exact sparsity, and where every contribution goes |
+//! | `internal.rs` | internal force and tangent stiffness of the points (Lagrangian eq. 27, 28) |
+//! | `scatter.rs` | dense blocks into the rows of their owners |
+//! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
+//! | `conditions.rs` | Dirichlet conditions on the nodes |
+
+pub mod conditions;
+pub mod external;
+pub mod internal;
+pub mod numbering;
+pub mod pattern;
+pub mod populated;
+pub mod scatter;
+
+pub use numbering::Numbering;
+pub use pattern::Pattern;
+pub use populated::Populated;
+pub use scatter::BlockMatrix;

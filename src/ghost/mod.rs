@@ -1,1 +1,14 @@
-//! (see lib.rs)
+//! Ghost stabilisation: penalise jumps of the normal gradient near the boundary of each body
+//! (Ghost §3), so that the condition of mass and stiffness is bounded wherever bodies lie on
+//! the grid.
+//!
+//! | file | idea | source |
+//! |---|---|---|
+//! | `faces.rs` | boundary faces, per body, then united | Ghost §3.1, §4.2 |
+//! | `stencil.rs` | the scalar face matrix J_G and its scalings | Ghost eq. 23, 24, 27, 28 |
+
+pub mod faces;
+pub mod stencil;
+
+pub use faces::{BoundaryFace, boundary_faces};
+pub use stencil::{FaceStencil, face_stencils};

@@ -6,6 +6,9 @@
 //! | `seed.rs` | deck bodies -> points |
 //! | `sort.rs` | points in the order of their cells |
 
+pub mod file;
+pub mod seed;
+
 use nalgebra::Matrix3;
 
 /// Declares the struct of arrays and everything that must treat each field alike: packing for
@@ -94,6 +97,8 @@ point_fields! {
     half_length_initial: [f64; D], D;
     /// Point force held by the point at full load, N
     point_force: [f64; D], D;
+    /// 1 for the outermost layer of the body's initial seeding, 0 inside
+    outermost: f64, 1;
     /// Corners of the CPDI2 domain (2D: 4, counter-clockwise; 3D: 8, hex8 order), m;
     /// zero for the other bases
     corners: [[f64; D]; 8], 8 * D;
@@ -139,6 +144,7 @@ impl<const D: usize> Points<D> {
         self.half_length.push(half_length);
         self.half_length_initial.push(half_length);
         self.point_force.push([0.0; D]);
+        self.outermost.push(0.0);
         self.corners.push(rectangle_corners(position, half_length));
     }
 }
@@ -165,7 +171,7 @@ pub fn rectangle_corners<const D: usize>(x: [f64; D], half: [f64; D]) -> [[f64; 
 }
 
 /// A field's value as `f64` words.
-trait Words: Sized {
+pub trait Words: Sized {
     fn write_words(&self, out: &mut Vec<f64>);
     fn read_words(words: &mut &[f64]) -> Self;
 }

@@ -1,0 +1,101 @@
+//! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
+
+use crate::assembly::numbering::Touched;
+use crate::assembly::{Numbering, Pattern, Populated, pattern};
+use crate::basis::{self, Groups, Influences};
+use crate::deck::model::{Deck, Ghost};
+use crate::error::Result;
+use crate::ghost::stencil::Penalty;
+use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
+use crate::grid::Grid;
+use crate::material::Material;
+use crate::parallel::{Partition, World};
+use crate::points::Points;
+
+/// What stays the same while points move: the deck made computable.
+pub struct Model<const D: usize> {
+    pub deck: Deck,
+    pub grid: Grid<D>,
+    pub partition: Partition<D>,
+    /// One per body.
+    pub materials: Vec<Material>,
+    /// One per body.
+    pub penalties: Vec<Penalty>,
+}
+
+/// Everything a step needs that depends on where the points are at its start.
+pub struct Discretisation<const D: usize> {
+    pub influences: Influences<D>,
+    pub groups: Groups,
+    /// Local node of each entry of `groups.nodes`.
+    pub group_nodes: Vec<u32>,
+    pub populated: Populated,
+    /// Faces owned here.
+    pub faces: Vec<FaceStencil>,
+    pub numbering: Numbering,
+    pub pattern: Pattern,
+    /// Sum of basis weights at each local node, over all ranks.
+    pub node_weight: Vec<f64>,
+    /// Local nodes that a Ghost face stabilises.
+    pub on_face: Vec<bool>,
+}
+
+impl<const D: usize> Discretisation<D> {
+    /// Maps the points onto the grid and numbers the equations. Collective.
+    pub fn new(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Self> {
+        let (grid, partition) = (&model.grid, &model.partition);
+        let basis = model.deck.method.basis;
+        let influences = world.fail_together(basis::map_points(grid, basis, points))?;
+        let groups = Groups::new(&influences);
+        let populated = Populated::find(world, grid, partition, basis, points)?;
+        let faces = find_faces(world, model, model.deck.ghost.as_ref(), &populated)?;
+
+        let mut reached = groups.nodes.clone();
+        reached.extend(faces.iter().flat_map(|face| face.nodes.iter().copied()));
+        for &cell in &populated.reached {
+            grid.cell_nodes(cell, &mut reached);
+        }
+        let touched = Touched::settle(world, grid, partition, reached)?;
+        let supports = (0..groups.len())
+            .map(|g| groups.nodes(g))
+            .chain(faces.iter().map(|face| face.nodes.as_slice()));
+        let owner_of = |node| partition.owner_of_node(grid, node);
+        let (numbering, pattern) = pattern::build(world, touched, owner_of, supports)?;
+
+        let group_nodes = groups.nodes.iter().map(|node| numbering.index[node]).collect();
+        let mut node_weight = vec![0.0; numbering.len()];
+        for (node, weight) in influences.nodes.iter().zip(&influences.weights) {
+            node_weight[numbering.index[node] as usize] += weight;
+        }
+        let mut on_face = vec![0.0; numbering.len()];
+        for node in faces.iter().flat_map(|face| &face.nodes) {
+            on_face[numbering.index[node] as usize] = 1.0;
+        }
+        for field in [&mut node_weight, &mut on_face] {
+            numbering.halo.reverse_add(world, field, 1)?;
+            numbering.halo.forward(world, field, 1)?;
+        }
+        Ok(Discretisation {
+            influences,
+            groups,
+            group_nodes,
+            populated,
+            faces,
+            numbering,
+            pattern,
+            node_weight,
+            on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
+        })
+    }
+}
+
+fn find_faces<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    ghost: Option<&Ghost>,
+    populated: &Populated,
+) -> Result<Vec<FaceStencil>> {
+    let Some(ghost) = ghost else { return Ok(Vec::new()) };
+    let faces = boundary_faces(world, &model.grid, &model.partition, &populated.owned)?;
+    world.fail_together(face_stencils(&model.grid, &faces, ghost.scaling, &model.penalties))
+}

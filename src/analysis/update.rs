@@ -1,0 +1,153 @@
+//! Grid to points at the end of a step (Ghost Figure 1 e, f; Lagrangian eq. 16, 31): deformation,
+//! stress, position, domain. A step that would leave an unsound point is refused as a whole.
+
+use nalgebra::Matrix3;
+
+use crate::assembly::internal::{deformation_increment, StepPoints};
+use crate::assembly::Numbering;
+use crate::basis::domain::update_domains;
+use crate::deck::model::{Basis, DomainUpdate};
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::material::Material;
+use crate::mechanics::{self, StepStart};
+use crate::parallel::World;
+use crate::points::Points;
+use crate::tensor;
+
+/// Increments at each point of this rank, computed but not yet applied.
+pub struct Increments<const D: usize> {
+    /// dF
+    pub deformation: Vec<[[f64; D]; D]>,
+    /// m
+    pub displacement: Vec<[f64; D]>,
+}
+
+/// Energies of this rank's points, J (J/m in plane strain).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PointEnergies {
+    pub strain: f64,
+    /// Dissipated since the start.
+    pub plastic: f64,
+    pub kinetic: f64,
+}
+
+/// Maps nodal increments (local nodes) to the points.
+pub fn increments<const D: usize>(
+    step: StepPoints<'_, D>,
+    displacement: &[f64],
+) -> Increments<D> {
+    let count = step.points.len();
+    let mut made =
+        Increments { deformation: Vec::with_capacity(count), displacement: Vec::with_capacity(count) };
+    for p in 0..count {
+        let row = step.influences.offsets[p]..step.influences.offsets[p + 1];
+        let group = step.groups.group_of_point[p];
+        let nodes = &step.group_nodes
+            [step.groups.node_offsets[group]..step.groups.node_offsets[group + 1]];
+        let nodal = |a: usize| -> [f64; D] {
+            let start = nodes[a] as usize * D;
+            std::array::from_fn(|i| displacement[start + i])
+        };
+        made.deformation.push(deformation_increment(&step.influences.gradients[row.clone()], nodal));
+        let mut moved = [0.0; D];
+        for (a, weight) in step.influences.weights[row].iter().enumerate() {
+            for (m, u) in moved.iter_mut().zip(nodal(a)) {
+                *m += weight * u;
+            }
+        }
+        made.displacement.push(moved);
+    }
+    made
+}
+
+/// Says why the increments cannot be accepted, if so: a NaN, an inverted point, a point outside
+/// the grid. The answer is the same on every rank. Collective.
+pub fn reason_to_refuse<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    points: &Points<D>,
+    increments: &Increments<D>,
+    check_grid: bool,
+) -> Option<String> {
+    let mut reason = None;
+    for p in 0..points.len() {
+        let x = points.position[p];
+        let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
+        let determinant = tensor::determinant(&increments.deformation[p]);
+        let what = if !determinant.is_finite() || moved.iter().any(|m| !m.is_finite()) {
+            "has a displacement that is not finite".to_string()
+        } else if determinant <= 0.0 {
+            format!("is turned inside out (det dF = {determinant:.3e})")
+        } else if check_grid && grid.locate(&moved).is_none() {
+            format!("leaves the grid: it would move to {moved:?}")
+        } else {
+            continue;
+        };
+        reason = Some(format!("point {} at {x:?} {what}", points.id[p]));
+        break;
+    }
+    world.first_message(reason)
+}
+
+/// Applies the increments: F, b_e, stress, history, domains, positions; returns the energies.
+#[allow(clippy::too_many_arguments)]
+pub fn apply<const D: usize>(
+    grid: &Grid<D>,
+    materials: &[Material],
+    basis: Basis,
+    rule: DomainUpdate,
+    numbering: &Numbering,
+    influences: &crate::basis::Influences<D>,
+    displacement: &[f64],
+    increments: &Increments<D>,
+    points: &mut Points<D>,
+) -> Result<()> {
+    let mut whole = Vec::with_capacity(points.len());
+    for p in 0..points.len() {
+        let increment = &increments.deformation[p];
+        let start = StepStart {
+            material: &materials[points.body[p] as usize],
+            deformation_gradient: &points.deformation_gradient[p],
+            elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
+            volume_initial: points.volume_initial[p],
+        };
+        let state = mechanics::stress(&start, increment);
+        let mut step = Matrix3::identity();
+        for i in 0..D {
+            for j in 0..D {
+                step[(i, j)] = increment[i][j];
+            }
+        }
+        points.deformation_gradient[p] = step * points.deformation_gradient[p];
+        points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
+        points.kirchhoff_stress[p] = state.kirchhoff_stress;
+        points.plastic_strain[p] += state.plastic_increment;
+        points.dissipation[p] += state.dissipation;
+        whole.push(step);
+    }
+    let _ = basis;
+    update_domains(grid, rule, points, influences, &whole, &|node| {
+        numbering.local(node).map(|local| std::array::from_fn(|i| displacement[local * D + i]))
+    })?;
+    for (x, moved) in points.position.iter_mut().zip(&increments.displacement) {
+        for (x, m) in x.iter_mut().zip(moved) {
+            *x += m;
+        }
+    }
+    Ok(())
+}
+
+/// Energies of this rank's points at their present state.
+pub fn energies<const D: usize>(points: &Points<D>, materials: &[Material]) -> PointEnergies {
+    let mut sum = PointEnergies::default();
+    for p in 0..points.len() {
+        let elasticity = materials[points.body[p] as usize].elasticity();
+        let strain = tensor::principal_log_strain(&points.elastic_left_cauchy_green[p]);
+        sum.strain += elasticity.energy(strain) * points.volume_initial[p];
+        sum.plastic += points.dissipation[p] * points.volume_initial[p];
+        let speed: f64 = points.velocity[p].iter().map(|v| v * v).sum();
+        sum.kinetic += 0.5 * points.mass[p] * speed;
+    }
+    sum
+}

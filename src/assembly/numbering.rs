@@ -1,0 +1,125 @@
+//! Equations over active nodes: those of populated cells. Each node belongs to one rank; a
+//! rank's equations are contiguous and ascend with the node number.
+
+use rustc_hash::FxHashMap;
+
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::parallel::{HaloPlan, Partition, World, exchange};
+
+/// Local view of the active nodes: owned ones first (ascending), then ghosts.
+#[derive(Debug)]
+pub struct Numbering {
+    /// Number of nodes owned here.
+    pub owned: usize,
+    /// Global number of the first one.
+    pub offset: usize,
+    /// Active nodes of all ranks.
+    pub total: usize,
+    /// Local index -> grid node.
+    pub nodes: Vec<usize>,
+    /// Local index -> global equation number of the node.
+    pub global: Vec<i32>,
+    /// Grid node -> local index.
+    pub index: FxHashMap<usize, u32>,
+    /// Owner <-> ghost exchange of nodal values.
+    pub halo: HaloPlan,
+}
+
+/// Nodes that this rank contributes to, before they are numbered.
+#[derive(Debug, Clone)]
+pub struct Touched {
+    /// Active nodes owned here, ascending: own ones and those that other ranks reach.
+    pub owned: Vec<usize>,
+    /// (owner, node) of the nodes reached here but owned elsewhere, ascending.
+    pub foreign: Vec<(usize, usize)>,
+}
+
+impl Touched {
+    /// Settles who owns the nodes in `reached` (any order, duplicates allowed). Collective.
+    pub fn settle<const D: usize>(
+        world: &World,
+        grid: &Grid<D>,
+        partition: &Partition<D>,
+        mut reached: Vec<usize>,
+    ) -> Result<Self> {
+        reached.sort_unstable();
+        reached.dedup();
+        let here = world.rank();
+        let mut owned = Vec::with_capacity(reached.len());
+        let mut foreign = Vec::new();
+        for node in reached {
+            match partition.owner_of_node(grid, node) {
+                owner if owner == here => owned.push(node),
+                owner => foreign.push((owner, node)),
+            }
+        }
+        foreign.sort_unstable();
+        let mut outgoing: Vec<(usize, Vec<u64>)> = Vec::new();
+        for &(owner, node) in &foreign {
+            match outgoing.last_mut() {
+                Some((rank, list)) if *rank == owner => list.push(node as u64),
+                _ => outgoing.push((owner, vec![node as u64])),
+            }
+        }
+        for (_, nodes) in exchange(world, outgoing)? {
+            owned.extend(nodes.iter().map(|&node| node as usize));
+        }
+        owned.sort_unstable();
+        owned.dedup();
+        Ok(Touched { owned, foreign })
+    }
+}
+
+impl Numbering {
+    /// Numbers the owned nodes and fetches the numbers of `ghosts`, pairs (owner, node) without
+    /// duplicates in ascending order. Collective.
+    pub fn build(world: &World, owned: Vec<usize>, ghosts: &[(usize, usize)]) -> Result<Self> {
+        let count = owned.len();
+        let offset = world.exclusive_sum(count);
+        let total = world.sum_usize(count);
+        if total > i32::MAX as usize / 3 {
+            return Err(Error::Run(format!(
+                "{total} active nodes need more equations than 32-bit indices can number; \
+                 use a coarser grid or a PETSc with 64-bit indices"
+            )));
+        }
+        let mut index: FxHashMap<usize, u32> =
+            owned.iter().enumerate().map(|(i, &node)| (node, i as u32)).collect();
+        let halo = HaloPlan::build(world, count, ghosts, |node| {
+            index.get(&node).map(|&i| i as usize)
+        })?;
+        let mut nodes = owned;
+        for &(_, node) in ghosts {
+            index.insert(node, nodes.len() as u32);
+            nodes.push(node);
+        }
+        let mut numbers: Vec<f64> = (0..nodes.len())
+            .map(|i| if i < count { (offset + i) as f64 } else { -1.0 })
+            .collect();
+        halo.forward(world, &mut numbers, 1)?;
+        Ok(Numbering {
+            owned: count,
+            offset,
+            total,
+            nodes,
+            global: numbers.into_iter().map(|number| number as i32).collect(),
+            index,
+            halo,
+        })
+    }
+
+    /// Owned and ghost nodes.
+    pub fn len(&self) -> usize {
+        self.nodes.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// Local index of a grid node that is active here.
+    pub fn local(&self, node: usize) -> Option<usize> {
+        self.index.get(&node).map(|&i| i as usize)
+    }
+}

@@ -1,0 +1,104 @@
+//! Dense blocks of groups and faces, added into the rows of their owners.
+
+use crate::error::Result;
+use crate::parallel::{World, exchange};
+
+use super::{Numbering, Pattern};
+
+/// Block-sparse values on a [`Pattern`]: `B x B` blocks, the scalar rows of an owned block row
+/// lying one after the other, so that the owned part is a compressed-row matrix as it stands.
+#[derive(Debug, Clone)]
+pub struct BlockMatrix<const B: usize> {
+    /// Owned rows: row r starts at `B * B * offsets[r]`; its scalar row i holds B values per
+    /// column. Ghost rows follow with the same layout.
+    pub values: Vec<f64>,
+}
+
+impl<const B: usize> BlockMatrix<B> {
+    pub fn zeros(pattern: &Pattern) -> Self {
+        BlockMatrix { values: vec![0.0; pattern.columns.len() * B * B] }
+    }
+
+    /// Adds the dense matrix `block` over `nodes` (local indices): entry (a, i, b, k) at `((a * B + i) * nodes.len() + b) * B + k`.
+    #[inline]
+    pub fn add(&mut self, numbering: &Numbering, pattern: &Pattern, nodes: &[u32], block: &[f64]) {
+        let count = nodes.len();
+        for (a, &row_node) in nodes.iter().enumerate() {
+            let row = pattern.row_of[row_node as usize] as usize;
+            let range = pattern.offsets[row]..pattern.offsets[row + 1];
+            let width = range.len();
+            let start = B * B * range.start;
+            let columns = &pattern.columns[range];
+            let (mut position, mut last) = (0, -1);
+            for (b, &column) in nodes.iter().enumerate() {
+                let key = numbering.global[column as usize];
+                // Nodes ascend within each owner's share: a merge, restarted where owners change.
+                if key < last {
+                    position = 0;
+                }
+                last = key;
+                while numbering.global[columns[position] as usize] < key {
+                    position += 1;
+                }
+                for i in 0..B {
+                    let target = start + (i * width + position) * B;
+                    let source = ((a * B + i) * count + b) * B;
+                    for k in 0..B {
+                        self.values[target + k] += block[source + k];
+                    }
+                }
+            }
+        }
+    }
+
+    /// Sends the ghost rows to their owners, who add them in ascending rank order. Collective.
+    pub fn reduce(&mut self, world: &World, pattern: &Pattern) -> Result<()> {
+        let ghosts = &self.values[B * B * pattern.ghost_start..];
+        let outgoing = pattern
+            .sends
+            .iter()
+            .map(|(rank, range)| (*rank, ghosts[B * B * range.start..B * B * range.end].to_vec()))
+            .collect();
+        let incoming = exchange(world, outgoing)?;
+        let mut by_rank = incoming.into_iter();
+        for (rank, positions) in &pattern.receives {
+            let Some((from, words)) = by_rank.next() else { break };
+            debug_assert_eq!(from, *rank);
+            self.add_received(pattern, positions, &words);
+        }
+        Ok(())
+    }
+
+    /// Entries arrive in the sender's layout: row by row, each row as B scalar rows.
+    fn add_received(&mut self, pattern: &Pattern, positions: &[u32], words: &[f64]) {
+        let mut entry = 0;
+        while entry < positions.len() {
+            // Entries of one row are consecutive and ascend within the owner's row.
+            let row = row_of_entry(pattern, positions[entry] as usize);
+            let range = pattern.offsets[row]..pattern.offsets[row + 1];
+            let mut end = entry + 1;
+            while end < positions.len()
+                && positions[end] > positions[end - 1]
+                && range.contains(&(positions[end] as usize))
+            {
+                end += 1;
+            }
+            let (width, sent) = (range.len(), end - entry);
+            for i in 0..B {
+                for (j, &position) in positions[entry..end].iter().enumerate() {
+                    let target =
+                        B * B * range.start + (i * width + position as usize - range.start) * B;
+                    let source = B * B * entry + (i * sent + j) * B;
+                    for k in 0..B {
+                        self.values[target + k] += words[source + k];
+                    }
+                }
+            }
+            entry = end;
+        }
+    }
+}
+
+fn row_of_entry(pattern: &Pattern, entry: usize) -> usize {
+    pattern.offsets.partition_point(|&offset| offset <= entry) - 1
+}
