@@ -8,8 +8,10 @@
 //!
 //! Node and cell numbers are global `usize` values, the same on every rank.
 
+pub mod element;
 pub mod face;
 pub mod lattice;
+pub mod quadrature;
 
 pub use face::FaceJump;
 pub use lattice::Lattice;
