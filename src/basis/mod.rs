@@ -7,9 +7,18 @@
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
+//! | (assembly) | `groups.rs` | points that touch the same nodes |
+
+pub mod domain;
+pub mod gimp;
+pub mod groups;
+pub mod mpm;
+
+pub use domain::update_domains;
+pub use groups::Groups;
 
 use crate::deck::model::Basis;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::Points;
 
@@ -26,23 +35,93 @@ pub struct Influences<const D: usize> {
     pub gradients: Vec<[f64; D]>,
 }
 
+impl<const D: usize> Influences<D> {
+    /// No rows yet, with room for `points` rows of about `nodes_each` nodes.
+    pub fn with_capacity(points: usize, nodes_each: usize) -> Self {
+        let mut offsets = Vec::with_capacity(points + 1);
+        offsets.push(0);
+        let entries = points * nodes_each;
+        Influences {
+            offsets,
+            nodes: Vec::with_capacity(entries),
+            weights: Vec::with_capacity(entries),
+            gradients: Vec::with_capacity(entries),
+        }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.offsets.len().saturating_sub(1)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The entries of point `p`, an index range into `nodes`, `weights` and `gradients`.
+    #[inline]
+    pub fn row(&self, p: usize) -> std::ops::Range<usize> {
+        self.offsets[p]..self.offsets[p + 1]
+    }
+
+    /// Adds a node to the row being built.
+    #[inline]
+    pub fn push(&mut self, node: usize, weight: f64, gradient: [f64; D]) {
+        self.nodes.push(node);
+        self.weights.push(weight);
+        self.gradients.push(gradient);
+    }
+
+    /// Ends the row being built.
+    #[inline]
+    pub fn close_row(&mut self) {
+        self.offsets.push(self.nodes.len());
+    }
+}
+
 /// Computes the influences of all points for a new step. Error: a point (or a corner of its
-/// domain) outside the grid, named by id and position.
+/// domain) outside the grid, named by id and position. A GIMP domain may reach over the grid's
+/// edge: its part beyond finds no nodes and is lost, only its centre must be inside.
 pub fn map_points<const D: usize>(
-    _grid: &Grid<D>,
-    _basis: Basis,
-    _points: &Points<D>,
+    grid: &Grid<D>,
+    basis: Basis,
+    points: &Points<D>,
 ) -> Result<Influences<D>> {
-    todo!()
+    match basis {
+        Basis::Mpm => mpm::map_points(grid, points),
+        Basis::Gimp => gimp::map_points(grid, points),
+        Basis::Cpdi1 | Basis::Cpdi2 => Err(unavailable(basis)),
+    }
 }
 
 /// Appends the cells populated by point `p`: strictly overlapped by its domain, or holding it.
+/// Their nodes together are the nodes of row `p` of [`map_points`].
 pub fn populated_cells<const D: usize>(
-    _grid: &Grid<D>,
-    _basis: Basis,
-    _points: &Points<D>,
-    _p: usize,
-    _out: &mut Vec<usize>,
+    grid: &Grid<D>,
+    basis: Basis,
+    points: &Points<D>,
+    p: usize,
+    out: &mut Vec<usize>,
 ) -> Result<()> {
-    todo!()
+    match basis {
+        Basis::Mpm => mpm::populated_cells(grid, points, p, out),
+        Basis::Gimp => gimp::populated_cells(grid, points, p, out),
+        Basis::Cpdi1 | Basis::Cpdi2 => Err(unavailable(basis)),
+    }
+}
+
+fn unavailable(basis: Basis) -> Error {
+    Error::Input(format!("method.basis = {basis:?} is not available; use mpm or gimp"))
+}
+
+/// The error for a point whose position `x` is in no cell.
+pub(crate) fn outside<const D: usize>(grid: &Grid<D>, points: &Points<D>, p: usize) -> Error {
+    let Grid::Lattice(lattice) = grid;
+    let low = lattice.origin;
+    let high = lattice.node_position(lattice.node_count() - 1);
+    Error::Run(format!(
+        "point {} of body {} is at {:?} m, outside the grid, which spans {low:?} to {high:?} m; \
+         enlarge the grid or look for what drove the point away",
+        points.id[p], points.body[p], points.position[p],
+    ))
 }

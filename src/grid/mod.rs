@@ -4,11 +4,16 @@
 //! |---|---|---|
 //! | `type = "lattice"` | [`Lattice`]: equal boxes, topology by arithmetic | `lattice.rs` |
 //! | `type = "mesh"` | [`Mesh`]: tri3, quad4, tet4, hex8 with faces and tags | `mesh.rs` |
+//! | interior faces for Ghost | [`FaceJump`] | `face.rs` |
 //!
 //! Node and cell numbers are global `usize` values, the same on every rank.
 
+pub mod element;
+pub mod face;
 pub mod lattice;
+pub mod quadrature;
 
+pub use face::FaceJump;
 pub use lattice::Lattice;
 
 /// Either grid, dispatched per call; both answer the same questions.

@@ -3,6 +3,11 @@
 
 use super::{Hencky, Response};
 
+/// A trial state counts as plastic when it lies outside the surface by more than this share of
+/// rho_y. Points at yield then start a step with the elastic tangent, whatever the rounding of
+/// their stored strain, so that counts of iterations repeat on any number of ranks.
+const YIELD_TOLERANCE: f64 = 1e-9;
+
 /// Perfect von Mises plasticity on Hencky elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VonMises {
@@ -23,7 +28,7 @@ impl VonMises {
         let deviator = trial.map(|e| e - mean);
         let norm = deviator.iter().map(|e| e * e).sum::<f64>().sqrt();
         let radius = two_mu * norm;
-        if radius <= self.yield_stress {
+        if radius <= self.yield_stress * (1.0 + YIELD_TOLERANCE) {
             return self.elasticity.respond(trial);
         }
         // Radial return: the deviator shrinks by theta, its direction n stays.

@@ -5,11 +5,24 @@
 //! | `previous` | last converged state | P~ (eq. 18) | d/dX~ | V_n | Lagrangian §5, A.2 |
 //! | `updated` | current state | Cauchy | d/dx | V | Lagrangian §3, A.1 |
 //! | `total` | initial state | P | d/dX (eq. 12) | V_0 | Lagrangian §4 |
+//!
+//! | file | idea |
+//! |---|---|
+//! | `mod.rs` | what the assembly sees |
+//! | `update.rs` | trial strain, material, new elastic strain: in principal axes |
+//! | `tangent.rs` | from principal moduli to A_ijkl of a frame |
+
+mod tangent;
+mod update;
+
+#[cfg(test)]
+mod tests;
 
 use nalgebra::Matrix3;
 
 use crate::deck::model::Frame;
 use crate::material::Material;
+use crate::tensor::dense::{self, Square};
 
 /// One point's contribution to equilibrium, in the chosen frame y:
 /// f_ai = T_ij (dS_a/dy_j) V and K_aibk = (dS_a/dy_j) A_ijkl (dS_b/dy_l) V,
@@ -49,16 +62,57 @@ pub struct StepStart<'a> {
     pub volume_initial: f64,
 }
 
-/// Stress only (explicit steps, last evaluation).
-pub fn stress<const D: usize>(_start: &StepStart, _increment: &[[f64; D]; D]) -> StressState {
-    todo!()
+/// Stress only (explicit steps, last evaluation). det dF < 0 is taken as it comes; a singular
+/// or not finite dF gives stresses that are not finite.
+pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> StressState {
+    update::update(start, increment).state(start.material)
 }
 
 /// Stress and tangent in `frame` for the increment dF = 1 + d(du)/dX~ (Lagrangian eq. 7).
+/// Plane strain for D = 2: dF_zz = 1. Limits as in [`stress`].
 pub fn contribution<const D: usize>(
-    _frame: Frame,
-    _start: &StepStart,
-    _increment: &[[f64; D]; D],
+    frame: Frame,
+    start: &StepStart,
+    increment: &[[f64; D]; D],
 ) -> (Contribution<D>, StressState) {
-    todo!()
+    let update = update::update(start, increment);
+    let placement = Placement::new(frame, start, increment);
+    let (stress, tangent) = tangent::pull_back(&update, &placement.back, placement.scale);
+    let contribution = Contribution {
+        stress,
+        tangent,
+        gradient_map: placement.gradient_map,
+        volume: placement.volume,
+    };
+    (contribution, update.state(start.material))
+}
+
+/// How a frame y lies to the current state x: T_ij = scale tau_im (dy/dx)_jm.
+struct Placement<const D: usize> {
+    /// dy/dx
+    back: Square<D>,
+    /// V0 / V_frame
+    scale: f64,
+    gradient_map: Square<D>,
+    volume: f64,
+}
+
+impl<const D: usize> Placement<D> {
+    #[inline]
+    fn new(frame: Frame, start: &StepStart, increment: &Square<D>) -> Self {
+        let start_gradient = dense::block::<D>(start.deformation_gradient);
+        let (inverse, det) = dense::inverse(increment);
+        let (back, gradient_map, ratio) = match frame {
+            Frame::Previous => (inverse, dense::identity(), dense::determinant(&start_gradient)),
+            Frame::Updated => {
+                (dense::identity(), inverse, det * dense::determinant(&start_gradient))
+            }
+            Frame::Total => {
+                let (start_inverse, _) = dense::inverse(&start_gradient);
+                (dense::multiply(&start_inverse, &inverse), start_gradient, 1.0)
+            }
+        };
+        let volume = ratio * start.volume_initial;
+        Placement { back, scale: 1.0 / ratio, gradient_map, volume }
+    }
 }

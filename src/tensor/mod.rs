@@ -1,1 +1,15 @@
 //! Small fixed-size tensors.
+//!
+//! | idea | file |
+//! |---|---|
+//! | `[[f64; D]; D]`: product, determinant, inverse, between 2D and 3D | `dense.rs` |
+//! | principal values and axes of a symmetric 3 x 3 tensor, ln, exp, sqrt | `spectral.rs` |
+//!
+//! Second-order tensors in `D` dimensions are `[[f64; D]; D]`, row first; what is
+//! three-dimensional even in plane strain is a `nalgebra::Matrix3`.
+
+pub mod dense;
+pub mod spectral;
+
+pub use dense::Square;
+pub use spectral::Spectrum;

@@ -1,0 +1,190 @@
+//! l_p after a step: how the domains follow the deformation (Lagrangian §6.4, eq. 32-39).
+//!
+//! | deck value | half length on axis i | equation |
+//! |---|---|---|
+//! | `none` | unchanged | |
+//! | `det` | l0_i (det F)^(1/D) | 32 |
+//! | `normal` | l0_i \|F_ii\| | 33 |
+//! | `stretch` | l0_i U_ii, U^2 = F^T F | 34 |
+//! | `corners` | half the extent of the moved side centres, scaled to the volume | 35-37 |
+//! | `normal-corrected` | as `normal`, scaled to the volume | 38 |
+//! | `normal-incremental` | as `normal-corrected`, from the last step with dF | 39 |
+//!
+//! A half length is a size: F_ii counts by its magnitude, so a half turn keeps a domain. Scaling
+//! to the volume multiplies all half lengths by one factor such that their product is that of
+//! the initial ones times det F. The basis `mpm` has no domain; its half length is V^(1/D)/2 of
+//! the current volume whatever the rule. CPDI domains move in their own files.
+
+use nalgebra::Matrix3;
+
+use super::gimp::spans;
+use crate::deck::model::{Basis, DomainUpdate};
+use crate::error::{Error, Result};
+use crate::grid::{Grid, Lattice};
+use crate::points::Points;
+use crate::tensor::spectral::square_root;
+
+/// Updates `points.half_length` at the end of a step: after `deformation_gradient` has become
+/// that of the step's end, while `position` and `half_length` are still those of its start.
+///
+/// `increments` holds dF of each point (read for `normal-incremental`), `displacement` gives the
+/// step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
+/// point's own row of [`map_points`](super::map_points) (read for `corners`).
+///
+/// Errors: a half length that is zero or not finite, and det F <= 0 where its root is needed,
+/// with the point's id and position.
+pub fn update_domains<const D: usize>(
+    grid: &Grid<D>,
+    basis: Basis,
+    rule: DomainUpdate,
+    points: &mut Points<D>,
+    increments: &[Matrix3<f64>],
+    displacement: &dyn Fn(usize) -> [f64; D],
+) -> Result<()> {
+    if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
+        return Ok(());
+    }
+    for p in 0..points.len() {
+        let gradient = &points.deformation_gradient[p];
+        let initial = &points.half_length_initial[p];
+        let new = match (basis, rule) {
+            (Basis::Mpm, _) => [0.5 * root::<D>(points.volume(p)); D],
+            (_, DomainUpdate::None) => continue,
+            (_, DomainUpdate::Det) => {
+                let factor = root::<D>(gradient.determinant());
+                initial.map(|l| l * factor)
+            }
+            (_, DomainUpdate::Normal) => scaled_by_diagonal(initial, gradient),
+            (_, DomainUpdate::Stretch) => {
+                let stretch = square_root(&(gradient.transpose() * gradient));
+                scaled_by_diagonal(initial, &stretch)
+            }
+            (_, DomainUpdate::NormalCorrected) => {
+                let lengths = scaled_by_diagonal(initial, gradient);
+                with_product(lengths, gradient.determinant() * product(initial))
+            }
+            (_, DomainUpdate::NormalIncremental) => {
+                let before = &points.half_length[p];
+                let lengths = scaled_by_diagonal(before, &increments[p]);
+                with_product(lengths, increments[p].determinant() * product(before))
+            }
+            (_, DomainUpdate::Corners) => {
+                let lengths = extent_of_moved_sides(grid, points, p, displacement)?;
+                with_product(lengths, gradient.determinant() * product(initial))
+            }
+        };
+        if !new.iter().all(|l| *l > 0.0 && l.is_finite()) {
+            return Err(collapsed(points, p, rule, new));
+        }
+        points.half_length[p] = new;
+    }
+    Ok(())
+}
+
+fn scaled_by_diagonal<const D: usize>(lengths: &[f64; D], tensor: &Matrix3<f64>) -> [f64; D] {
+    std::array::from_fn(|i| lengths[i] * tensor[(i, i)].abs())
+}
+
+/// Scales `lengths` by one factor so that their product becomes `volume`.
+fn with_product<const D: usize>(lengths: [f64; D], volume: f64) -> [f64; D] {
+    let factor = root::<D>(volume / product(&lengths));
+    lengths.map(|l| l * factor)
+}
+
+fn product<const D: usize>(lengths: &[f64; D]) -> f64 {
+    lengths.iter().product()
+}
+
+/// x^(1/D); NaN below zero.
+fn root<const D: usize>(x: f64) -> f64 {
+    match D {
+        2 => x.sqrt(),
+        _ if x < 0.0 => f64::NAN,
+        _ => x.cbrt(),
+    }
+}
+
+/// Eq. 35, 36: moves the corners of the domain with the grid, takes the centre of each side
+/// (edges in the plane, faces in space: the mean of its corners) and returns half of the
+/// centres' extent per axis.
+///
+/// A corner is interpolated in the overlapped cell it belongs to, so only nodes of the point's
+/// own row are asked for; a corner beyond the grid moves as the nearest place on the grid's edge.
+fn extent_of_moved_sides<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    displacement: &dyn Fn(usize) -> [f64; D],
+) -> Result<[f64; D]> {
+    let Grid::Lattice(lattice) = grid;
+    let spans = spans(grid, lattice, points, p)?;
+    let (x, half) = (&points.position[p], &points.half_length[p]);
+
+    // Centres relative to the point: sides[axis][0] below, [1] above.
+    let mut sides = [[[0.0; D]; 2]; D];
+    let share = 1.0 / f64::from(1u32 << (D - 1));
+    for corner in 0..1usize << D {
+        let upper: [bool; D] = std::array::from_fn(|a| corner >> a & 1 == 1);
+        let offset: [f64; D] = std::array::from_fn(|a| if upper[a] { half[a] } else { -half[a] });
+        let cell = std::array::from_fn(|a| if upper[a] { spans[a].last } else { spans[a].first });
+        let local = std::array::from_fn(|a| {
+            (lattice.scaled(a, x[a] + offset[a]) - cell[a] as f64).clamp(0.0, 1.0)
+        });
+        let moved = interpolate(lattice, cell, local, displacement);
+        for axis in 0..D {
+            let centre = &mut sides[axis][usize::from(upper[axis])];
+            for i in 0..D {
+                centre[i] += share * (offset[i] + moved[i]);
+            }
+        }
+    }
+    Ok(std::array::from_fn(|i| {
+        let places = || sides.iter().flatten().map(|centre| centre[i]);
+        0.5 * (places().fold(f64::NEG_INFINITY, f64::max) - places().fold(f64::INFINITY, f64::min))
+    }))
+}
+
+/// Displacement at `local` in [0, 1]^D of the cell with index `low`.
+fn interpolate<const D: usize>(
+    lattice: &Lattice<D>,
+    low: [usize; D],
+    local: [f64; D],
+    displacement: &dyn Fn(usize) -> [f64; D],
+) -> [f64; D] {
+    let mut sum = [0.0; D];
+    for corner in 0..1usize << D {
+        let upper: [usize; D] = std::array::from_fn(|a| corner >> a & 1);
+        let weight = (0..D).fold(1.0, |product, a| {
+            product * if upper[a] == 1 { local[a] } else { 1.0 - local[a] }
+        });
+        let node = lattice.node_at(std::array::from_fn(|a| low[a] + upper[a]));
+        let value = displacement(node);
+        for i in 0..D {
+            sum[i] += weight * value[i];
+        }
+    }
+    sum
+}
+
+fn collapsed<const D: usize>(
+    points: &Points<D>,
+    p: usize,
+    rule: DomainUpdate,
+    lengths: [f64; D],
+) -> Error {
+    let gradient = &points.deformation_gradient[p];
+    let diagonal: [f64; D] = std::array::from_fn(|i| gradient[(i, i)]);
+    let advice = match rule {
+        DomainUpdate::Corners | DomainUpdate::Stretch => {
+            "the deformation itself is not valid: try smaller steps"
+        }
+        _ => "method.domain_update = \"corners\" or \"stretch\" stays valid under rotation",
+    };
+    Error::Run(format!(
+        "point {} at {:?} m: its domain got half lengths {lengths:?} m from det F = {:e} and \
+         diagonal F = {diagonal:?}; {advice}",
+        points.id[p],
+        points.position[p],
+        gradient.determinant(),
+    ))
+}

@@ -1,0 +1,171 @@
+//! S_v = 1/(2 l_p) int N_v over [x_p - l_p, x_p + l_p], product over the axes (Ghost §2.5).
+//!
+//! The mean of a hat function over an interval is summed cell by cell, where the hat is linear:
+//! the share of the domain in the cell times the hat at the middle of that piece. This is exact
+//! for any half length and free of cancellation. Parts beyond the grid find no nodes: there the
+//! weights sum to less than one.
+//!
+//! A cell is populated when it is overlapped by more than [`OVERLAP_TOLERANCE`] of its size on
+//! each axis; one that is only touched, or overlapped by round-off, is not. The cell that holds
+//! the centre always counts. The row of a point is exactly the nodes of its populated cells.
+
+use super::{Influences, outside};
+use crate::error::{Error, Result};
+use crate::grid::{Grid, Lattice};
+use crate::points::Points;
+
+/// Overlap, as a share of the cell size, up to which a domain's end is taken to lie on the grid
+/// line: far above round-off of positions on large grids, far below any length that matters.
+pub const OVERLAP_TOLERANCE: f64 = 1e-10;
+
+/// The first and last cell overlapped along one axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Span {
+    pub first: usize,
+    pub last: usize,
+}
+
+impl Span {
+    /// Of the scaled interval [low, high] around `centre`, all in cells from the grid's origin.
+    #[inline]
+    fn new(low: f64, centre: f64, high: f64, cells: usize) -> Self {
+        // Conversion to usize saturates: ends beyond the grid are clamped to it.
+        let home = (centre as usize).min(cells - 1);
+        let first = ((low + OVERLAP_TOLERANCE) as usize).min(home);
+        let last = ((high - OVERLAP_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
+        Span { first, last }
+    }
+}
+
+/// The cells overlapped by the domain of point `p`, per axis.
+#[inline]
+pub(super) fn spans<const D: usize>(
+    grid: &Grid<D>,
+    lattice: &Lattice<D>,
+    points: &Points<D>,
+    p: usize,
+) -> Result<[Span; D]> {
+    let (x, half) = (&points.position[p], &points.half_length[p]);
+    let mut spans = [Span { first: 0, last: 0 }; D];
+    for axis in 0..D {
+        let centre = lattice.scaled(axis, x[axis]);
+        if !(centre >= 0.0 && centre <= lattice.cells[axis] as f64) {
+            return Err(outside(grid, points, p));
+        }
+        let reach = half[axis] / lattice.spacing[axis];
+        if !(reach > 0.0 && reach.is_finite()) {
+            return Err(Error::Run(format!(
+                "point {} at {x:?} m has domain half lengths {half:?} m; each must be positive",
+                points.id[p]
+            )));
+        }
+        spans[axis] = Span::new(centre - reach, centre, centre + reach, lattice.cells[axis]);
+    }
+    Ok(spans)
+}
+
+pub(super) fn map_points<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+) -> Result<Influences<D>> {
+    let Grid::Lattice(lattice) = grid;
+    let mut influences = Influences::with_capacity(points.len(), 3usize.pow(D as u32));
+    let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
+    for p in 0..points.len() {
+        let spans = spans(grid, lattice, points, p)?;
+        for axis in 0..D {
+            let centre = lattice.scaled(axis, points.position[p][axis]);
+            let reach = points.half_length[p][axis] / lattice.spacing[axis];
+            lines[axis].fill(spans[axis], centre, reach, lattice.cells[axis]);
+        }
+        push_product(lattice, &spans, &lines, &mut influences);
+        influences.close_row();
+    }
+    Ok(influences)
+}
+
+pub(super) fn populated_cells<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    out: &mut Vec<usize>,
+) -> Result<()> {
+    let Grid::Lattice(lattice) = grid;
+    let spans = spans(grid, lattice, points, p)?;
+    for_each_index(&spans.map(|s| s.last - s.first + 1), |index| {
+        out.push(lattice.cell_at(std::array::from_fn(|a| spans[a].first + index[a])));
+    });
+    Ok(())
+}
+
+/// One-dimensional weights and slopes (per cell size) of the nodes of a span.
+#[derive(Debug, Clone, Default)]
+struct Line {
+    weights: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+impl Line {
+    #[inline]
+    fn fill(&mut self, span: Span, centre: f64, reach: f64, cells: usize) {
+        let nodes = span.last - span.first + 2;
+        for values in [&mut self.weights, &mut self.slopes] {
+            values.clear();
+            values.resize(nodes, 0.0);
+        }
+        // Distances are taken from the span's first node, so large grids cost no digits. The
+        // outermost pieces end where the domain ends, or at the grid's edge: an end that only
+        // round-off parts from a grid line continues the hat's straight line.
+        let offset = centre - span.first as f64;
+        let (low, high) = (offset - reach, offset + reach);
+        let low = if span.first == 0 { low.max(0.0) } else { low };
+        let high = if span.last + 1 == cells { high.min((nodes - 1) as f64) } else { high };
+        let last = nodes - 2;
+        for cell in 0..=last {
+            let start = if cell == 0 { low } else { cell as f64 };
+            let end = if cell == last { high } else { (cell + 1) as f64 };
+            let share = (end - start) / (2.0 * reach);
+            let middle = 0.5 * (start + end) - cell as f64;
+            self.weights[cell] += share * (1.0 - middle);
+            self.weights[cell + 1] += share * middle;
+            self.slopes[cell] -= share;
+            self.slopes[cell + 1] += share;
+        }
+    }
+}
+
+/// Pushes the tensor product of the lines, nodes ascending.
+#[inline]
+fn push_product<const D: usize>(
+    lattice: &Lattice<D>,
+    spans: &[Span; D],
+    lines: &[Line; D],
+    influences: &mut Influences<D>,
+) {
+    for_each_index(&spans.map(|s| s.last - s.first + 2), |index| {
+        let node = lattice.node_at(std::array::from_fn(|a| spans[a].first + index[a]));
+        let weights: [f64; D] = std::array::from_fn(|a| lines[a].weights[index[a]]);
+        let gradient = std::array::from_fn(|axis| {
+            let slope = lines[axis].slopes[index[axis]] / lattice.spacing[axis];
+            (0..D).filter(|&a| a != axis).fold(slope, |product, a| product * weights[a])
+        });
+        influences.push(node, weights.iter().product(), gradient);
+    });
+}
+
+/// Calls `visit` with every index below `counts`, first axis fastest.
+#[inline]
+fn for_each_index<const D: usize>(counts: &[usize; D], mut visit: impl FnMut([usize; D])) {
+    let total: usize = counts.iter().product();
+    let mut index = [0; D];
+    for _ in 0..total {
+        visit(index);
+        for axis in 0..D {
+            index[axis] += 1;
+            if index[axis] < counts[axis] {
+                break;
+            }
+            index[axis] = 0;
+        }
+    }
+}

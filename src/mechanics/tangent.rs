@@ -1,0 +1,96 @@
+//! A_ijkl = s H_jm H_ln (dtau_im/dL_kn - tau_in delta_mk) with L = d(dF) dF^-1 and H = dy/dx:
+//! Lagrangian (A.1) for `updated`, (A.3) for `previous`, one formula for the three frames.
+//!
+//! In the principal axes of the trial b the fourth-order tensor is sparse (a, b not summed):
+//! dtau_aa = c_ab L_bb and, for a != b, dtau_ab = r_ab (b_b L_ab + b_a L_ba) with
+//! r_ab = (tau_a - tau_b) / (b_a - b_b). The stress term joins the same places:
+//! M_aabb = c_ab - tau_a delta_ab, M_abab = r_ab b_b, M_abba = r_ab b_a - tau_a.
+
+use super::update::Update;
+use crate::tensor::dense::{Square, dot};
+use crate::tensor::spectral::logarithm_slope;
+
+/// Stress T and tangent A; `back` is H, `scale` s = V0 / V_frame.
+#[inline]
+pub(super) fn pull_back<const D: usize>(
+    update: &Update,
+    back: &Square<D>,
+    scale: f64,
+) -> (Square<D>, [[Square<D>; D]; D]) {
+    let stress = &update.response.stress;
+    // Axes on the current state's side, and carried back to the frame.
+    let here: Square<D> = std::array::from_fn(|a| std::array::from_fn(|i| update.trial.axes[a][i]));
+    let there: Square<D> =
+        std::array::from_fn(|a| std::array::from_fn(|j| dot(&back[j], &here[a])));
+
+    let mut frame_stress = [[0.0; D]; D];
+    for a in 0..D {
+        for i in 0..D {
+            let force = scale * stress[a] * here[a][i];
+            for j in 0..D {
+                frame_stress[i][j] += force * there[a][j];
+            }
+        }
+    }
+
+    // M_abcd n_c x (H n_d), for each pair (a, b).
+    let mut half = [[[[0.0; D]; D]; D]; D];
+    for a in 0..D {
+        for c in 0..D {
+            let own = if a == c { stress[a] } else { 0.0 };
+            let modulus = scale * (update.response.tangent[a][c] - own);
+            add(&mut half[a][a], modulus, &here[c], &there[c]);
+        }
+        for b in 0..D {
+            if a != b {
+                let rate = scale * shear_rate(update, a, b);
+                let values = &update.trial.values;
+                add(&mut half[a][b], rate * values[b], &here[a], &there[b]);
+                let cross = rate * values[a] - scale * stress[a];
+                add(&mut half[a][b], cross, &here[b], &there[a]);
+            }
+        }
+    }
+
+    let mut tangent = [[[[0.0; D]; D]; D]; D];
+    for j in 0..D {
+        for a in 0..D {
+            // The second index first: sum_b (H n_b)_j half_ab.
+            let mut partial = [[0.0; D]; D];
+            for b in 0..D {
+                accumulate(&mut partial, there[b][j], &half[a][b]);
+            }
+            for i in 0..D {
+                accumulate(&mut tangent[i][j], here[a][i], &partial);
+            }
+        }
+    }
+    (frame_stress, tangent)
+}
+
+/// r_ab = (tau_a - tau_b) / (b_a - b_b), exact also where the values coincide.
+#[inline]
+fn shear_rate(update: &Update, a: usize, b: usize) -> f64 {
+    let (values, logs) = (&update.trial.values, &update.logarithms);
+    // Pairs 01, 12, 20.
+    let pair = if a + b == 2 { 2 } else { a.min(b) };
+    0.5 * update.response.shear[pair] * logarithm_slope(values[a], values[b], logs[a], logs[b])
+}
+
+#[inline]
+fn add<const D: usize>(sum: &mut Square<D>, factor: f64, n: &[f64; D], m: &[f64; D]) {
+    for k in 0..D {
+        for l in 0..D {
+            sum[k][l] += factor * n[k] * m[l];
+        }
+    }
+}
+
+#[inline]
+fn accumulate<const D: usize>(sum: &mut Square<D>, factor: f64, term: &Square<D>) {
+    for k in 0..D {
+        for l in 0..D {
+            sum[k][l] += factor * term[k][l];
+        }
+    }
+}
