@@ -56,7 +56,9 @@ fn main() {
         .prepend_enum_name(false)
         .allowlist_function("(Petsc|PETSC_|Vec|Mat|KSP|PC|SNES|IS).*")
         .allowlist_type("(Petsc|Vec|Mat|KSP|PC|SNES|IS|Insert|Norm).*")
-        .allowlist_var("(PETSC|MAT|VEC|KSP|PC|SNES|IS_|INSERT|ADD|NORM|SUBSET|SAME|DIFFERENT).*")
+        .allowlist_var(
+            "(PetscTrFree|PETSC|MAT|VEC|KSP|PC|SNES|IS_|INSERT|ADD|NORM|SUBSET|SAME|DIFFERENT).*",
+        )
         .blocklist_type("MPI_.*|ompi_.*")
         .blocklist_function("P?MPI_.*")
         .blocklist_var("MPI_.*|ompi_.*|FP_.*")

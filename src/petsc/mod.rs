@@ -1,1 +1,33 @@
+//! Thin, safe wrappers over the parts of PETSc that the project uses.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `sys.rs` | raw bindings, generated |
+//! | `check.rs` | return codes to errors; one rank's error becomes every rank's |
+//! | `session.rs` | start and end of PETSc, order of the options, abort |
+//! | `options.rs` | defaults that the user can override, options nobody read |
+//! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
+//! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
+//! | `ksp.rs` | [`Ksp`]: linear solver |
+//! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
+//! | `log.rs` | [`log::Phase`]: stages seen by `-log_view` |
+//!
+//! Every constructor and every method that talks to a communicator is collective. Objects that
+//! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
+
+mod check;
+pub mod ksp;
+pub mod log;
+pub mod matrix;
+pub mod options;
+pub mod session;
+pub mod snes;
 pub mod sys;
+pub mod vector;
+
+pub use check::agree;
+pub use ksp::{Ksp, KspOutcome};
+pub use matrix::Matrix;
+pub use session::{Session, abort_all, version};
+pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
+pub use vector::Vector;

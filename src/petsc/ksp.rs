@@ -1,0 +1,181 @@
+//! Linear solver: A x = b by whatever the options under the prefix say.
+
+use std::ptr::{null, null_mut};
+
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::AsRaw;
+
+use super::check::{bool_of, c_text, petsc, require_running, running, text_of};
+use super::vector::index;
+use super::{Matrix, Vector, sys};
+use crate::error::{Error, Result};
+
+/// Owner of a PETSc `KSP`.
+#[derive(Debug)]
+pub struct Ksp {
+    raw: sys::KSP,
+    prefix: String,
+    /// Matrix the solver was last given.
+    matrix: u64,
+}
+
+/// How a linear solve ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KspOutcome {
+    pub iterations: usize,
+    pub converged: bool,
+    /// PETSc's word for the end, for example `CONVERGED_RTOL`.
+    pub reason: String,
+    /// In the norm of the method (preconditioned for most); zero for a direct solver.
+    pub residual_norm: f64,
+}
+
+impl KspOutcome {
+    /// An error of the run unless the solve converged; `what` names the system.
+    pub fn require(self, what: &str) -> Result<Self> {
+        if self.converged {
+            return Ok(self);
+        }
+        Err(Error::Run(format!(
+            "the linear solver for {what} ended with {} after {} iterations (residual norm {:.3e})",
+            self.reason, self.iterations, self.residual_norm
+        )))
+    }
+}
+
+impl Ksp {
+    /// `prefix` without the dash: options `-<prefix>ksp_type`, `-<prefix>pc_type`, ...
+    pub fn new(comm: &SimpleCommunicator, prefix: &str) -> Result<Self> {
+        require_running()?;
+        let mut ksp = Ksp { raw: null_mut(), prefix: prefix.into(), matrix: 0 };
+        petsc!(KSPCreate(comm.as_raw(), &mut ksp.raw))?;
+        let prefix = c_text(prefix)?;
+        petsc!(KSPSetOptionsPrefix(ksp.raw, prefix.as_ptr()))?;
+        Ok(ksp)
+    }
+
+    /// Takes over one reference to a live `KSP`.
+    pub(super) fn from_reference(raw: sys::KSP, prefix: &str) -> Self {
+        Ksp { raw, prefix: prefix.into(), matrix: 0 }
+    }
+
+    /// Built-in options under the prefix: pairs such as `("ksp_type", "cg")`. The user's win.
+    /// Call before [`Self::set_from_options`].
+    pub fn set_defaults(&self, options: &[(&str, &str)]) -> Result<()> {
+        for (name, value) in options {
+            super::options::set_default(&format!("{}{name}", self.prefix), value)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the options under the prefix. Values set by methods before this can be overridden
+    /// by the user, values set after it cannot.
+    pub fn set_from_options(&mut self) -> Result<()> {
+        petsc!(KSPSetFromOptions(self.raw))
+    }
+
+    /// Relative and absolute residual, iterations; `None` leaves a value as it is.
+    pub fn set_tolerances(
+        &mut self,
+        relative: Option<f64>,
+        absolute: Option<f64>,
+        iterations: Option<usize>,
+    ) -> Result<()> {
+        let default = f64::from(sys::PETSC_DEFAULT);
+        let iterations = iterations.map_or(Ok(sys::PETSC_DEFAULT), index)?;
+        petsc!(KSPSetTolerances(
+            self.raw,
+            relative.unwrap_or(default),
+            absolute.unwrap_or(default),
+            default,
+            iterations
+        ))
+    }
+
+    /// The matrix of the next solves. After a change of its values call this again, unless
+    /// the old preconditioner is to serve on. Another matrix may have another size and pattern.
+    pub fn set_operators(&mut self, matrix: &Matrix) -> Result<()> {
+        if self.matrix != 0 && self.matrix != matrix.id() {
+            petsc!(KSPReset(self.raw))?;
+        }
+        self.matrix = matrix.id();
+        petsc!(KSPSetOperators(self.raw, matrix.raw(), matrix.raw()))
+    }
+
+    /// Keep the preconditioner (or factors) although the matrix changes.
+    pub fn set_reuse_preconditioner(&mut self, reuse: bool) -> Result<()> {
+        petsc!(KSPSetReusePreconditioner(self.raw, bool_of(reuse)))
+    }
+
+    /// Start from the vector passed as solution instead of zero.
+    pub fn set_initial_guess_nonzero(&mut self, nonzero: bool) -> Result<()> {
+        petsc!(KSPSetInitialGuessNonzero(self.raw, bool_of(nonzero)))
+    }
+
+    /// Solves A x = b. Not converging is an outcome, not an error: see [`KspOutcome::require`].
+    pub fn solve(&mut self, b: &Vector, x: &mut Vector) -> Result<KspOutcome> {
+        petsc!(KSPSolve(self.raw, b.raw(), x.raw()))?;
+        outcome(self.raw)
+    }
+
+    /// Method and preconditioner in use, for the report: for example "cg + gamg".
+    pub fn describe(&self) -> Result<String> {
+        describe(self.raw)
+    }
+}
+
+impl Drop for Ksp {
+    fn drop(&mut self) {
+        if !self.raw.is_null() && running() {
+            // SAFETY: this is the only owner of the handle.
+            unsafe { sys::KSPDestroy(&mut self.raw) };
+        }
+    }
+}
+
+/// The end of the last solve of a live `KSP`.
+pub(super) fn outcome(ksp: sys::KSP) -> Result<KspOutcome> {
+    let (mut reason, mut iterations, mut norm, mut text) = (0, 0, 0.0, null());
+    petsc!(KSPGetConvergedReason(ksp, &mut reason))?;
+    petsc!(KSPGetConvergedReasonString(ksp, &mut text))?;
+    petsc!(KSPGetIterationNumber(ksp, &mut iterations))?;
+    petsc!(KSPGetResidualNorm(ksp, &mut norm))?;
+    let mut reason_text = text_of(text);
+    if reason == sys::KSP_DIVERGED_PC_FAILED {
+        let (mut pc, mut why) = (null_mut(), 0);
+        petsc!(KSPGetPC(ksp, &mut pc))?;
+        petsc!(PCGetFailedReason(pc, &mut why))?;
+        reason_text = format!("{reason_text} ({})", pc_failure(why));
+    }
+    Ok(KspOutcome {
+        iterations: iterations.max(0) as usize,
+        converged: reason > 0,
+        reason: reason_text,
+        residual_norm: norm,
+    })
+}
+
+fn pc_failure(reason: sys::PCFailedReason) -> &'static str {
+    match reason {
+        sys::PC_FACTOR_STRUCT_ZEROPIVOT => "the matrix is structurally singular",
+        sys::PC_FACTOR_NUMERIC_ZEROPIVOT => "zero pivot: the matrix is singular",
+        sys::PC_FACTOR_OUTMEMORY => "the factorisation ran out of memory",
+        sys::PC_FACTOR_OTHER => "the factorisation failed",
+        sys::PC_SUBPC_ERROR => "an inner solver failed",
+        _ => "the preconditioner could not be set up",
+    }
+}
+
+pub(super) fn describe(ksp: sys::KSP) -> Result<String> {
+    let (mut method, mut pc, mut pc_type) = (null(), null_mut(), null());
+    petsc!(KSPGetType(ksp, &mut method))?;
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    petsc!(PCGetType(pc, &mut pc_type))?;
+    let mut text = format!("{} + {}", text_of(method), text_of(pc_type));
+    let mut solver = null();
+    petsc!(PCFactorGetMatSolverType(pc, &mut solver))?;
+    if !solver.is_null() {
+        text = format!("{text} ({})", text_of(solver));
+    }
+    Ok(text)
+}

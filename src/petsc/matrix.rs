@@ -1,0 +1,348 @@
+//! Distributed matrix in compressed rows (AIJ): pattern fixed at creation, values replaced whole.
+//!
+//! On more than one rank PETSc stores each row in two matrices: the columns this rank owns and
+//! the others. With columns sorted, a row of ours is left part + own part + right part, so an
+//! update is three block copies per row into PETSc's own arrays.
+
+use std::ptr::null_mut;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use mpi::collective::SystemOperation;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{AsRaw, CommunicatorCollectives};
+
+use super::check::{agree, bool_of, petsc, require_running, running};
+use super::sys;
+use super::vector::{Vector, index};
+use crate::error::{Error, Result};
+
+/// Owner of a PETSc `Mat`, square, with as many columns as rows on each rank.
+#[derive(Debug)]
+pub struct Matrix {
+    raw: sys::Mat,
+    /// Distinguishes matrices over the process: solvers drop what they built for another one.
+    id: u64,
+    rows: usize,
+    block_size: usize,
+    row_offsets: Vec<usize>,
+    /// Per row: entries left of the own columns, and entries in them. Empty on one rank.
+    split: Vec<(u32, u32)>,
+    symmetric: Option<bool>,
+    spd: Option<bool>,
+}
+
+static NEXT_ID: AtomicU64 = AtomicU64::new(1);
+
+impl Matrix {
+    /// Collective. Builds the matrix from this rank's rows (possibly none): row r holds
+    /// `columns[row_offsets[r]..row_offsets[r + 1]]`, global and ascending, with `values`.
+    /// `rows_local` is a multiple of `block_size`; ranks own consecutive rows in rank order.
+    ///
+    /// Errors, the same on every rank: more rows than a 32-bit number can count, offsets or
+    /// columns out of order or range.
+    pub fn from_csr(
+        comm: &SimpleCommunicator,
+        block_size: usize,
+        rows_local: usize,
+        row_offsets: &[i32],
+        columns: &[i32],
+        values: &[f64],
+    ) -> Result<Self> {
+        require_running()?;
+        let mut below = 0u64;
+        let mut all = 0u64;
+        let mine = rows_local as u64;
+        comm.scan_into(&mine, &mut below, SystemOperation::sum());
+        comm.all_reduce_into(&mine, &mut all, SystemOperation::sum());
+        let first = (below - mine) as usize;
+        let own = first..first + rows_local;
+        agree(
+            comm,
+            index(all as usize)
+                .map(drop)
+                .and_then(|()| check_rows(block_size, &own, all, row_offsets, columns, values)),
+        )?;
+
+        let (n, block) = (index(rows_local)?, index(block_size)?);
+        let mut matrix = Matrix {
+            raw: null_mut(),
+            id: NEXT_ID.fetch_add(1, Ordering::Relaxed),
+            rows: rows_local,
+            block_size,
+            row_offsets: row_offsets.iter().map(|&k| k as usize).collect(),
+            split: Vec::new(),
+            symmetric: None,
+            spd: None,
+        };
+        petsc!(MatCreate(comm.as_raw(), &mut matrix.raw))?;
+        petsc!(MatSetSizes(matrix.raw, n, n, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
+        petsc!(MatSetBlockSize(matrix.raw, block))?;
+        petsc!(MatSetType(matrix.raw, sys::MATAIJ.as_ptr().cast()))?;
+        // Each of the two does nothing on a matrix of the other type.
+        let (rows, cols, vals) = (row_offsets.as_ptr(), columns.as_ptr(), values.as_ptr());
+        petsc!(MatSeqAIJSetPreallocationCSR(matrix.raw, rows, cols, vals))?;
+        petsc!(MatMPIAIJSetPreallocationCSR(matrix.raw, rows, cols, vals))?;
+        // With these two the later assemblies need no communication.
+        petsc!(MatSetOption(matrix.raw, sys::MAT_NO_OFF_PROC_ENTRIES, sys::PETSC_TRUE))?;
+        petsc!(MatSetOption(matrix.raw, sys::MAT_NEW_NONZERO_LOCATIONS, sys::PETSC_FALSE))?;
+        matrix.find_split(columns, own)?;
+        Ok(matrix)
+    }
+
+    /// Where each row is cut between the two matrices of PETSc's parallel format.
+    fn find_split(&mut self, columns: &[i32], own: std::ops::Range<usize>) -> Result<()> {
+        let Some((diagonal, other)) = self.parts()? else { return Ok(()) };
+        self.split.reserve_exact(self.rows);
+        for row in self.row_offsets.windows(2) {
+            let columns = &columns[row[0]..row[1]];
+            let left = columns.partition_point(|&c| (c as usize) < own.start);
+            let end = columns.partition_point(|&c| (c as usize) < own.end);
+            self.split.push((left as u32, (end - left) as u32));
+        }
+        let inside: usize = self.split.iter().map(|s| s.1 as usize).sum();
+        let total = self.row_offsets.last().copied().unwrap_or(0);
+        if stored(diagonal)? != inside || stored(other)? != total - inside {
+            return Err(Error::Environment(
+                "PETSc stored a matrix with another pattern than the one it was given".into(),
+            ));
+        }
+        Ok(())
+    }
+
+    /// The two sequential matrices of the parallel format; `None` on one rank.
+    fn parts(&self) -> Result<Option<(sys::Mat, sys::Mat)>> {
+        let mut parallel = sys::PETSC_FALSE;
+        let kind = sys::MATMPIAIJ.as_ptr().cast();
+        petsc!(PetscObjectTypeCompare(self.raw.cast(), kind, &mut parallel))?;
+        if parallel == sys::PETSC_FALSE {
+            return Ok(None);
+        }
+        let (mut diagonal, mut other, mut map) = (null_mut(), null_mut(), std::ptr::null());
+        petsc!(MatMPIAIJGetSeqAIJ(self.raw, &mut diagonal, &mut other, &mut map))?;
+        Ok(Some((diagonal, other)))
+    }
+
+    /// Replaces all values, in the order of `from_csr`; solvers see the change. Collective, but
+    /// without communication.
+    pub fn update(&mut self, values: &[f64]) -> Result<()> {
+        let total = self.row_offsets.last().copied().unwrap_or(0);
+        if values.len() != total {
+            return Err(Error::Environment(format!(
+                "{} values for a matrix of {total} entries",
+                values.len()
+            )));
+        }
+        match self.parts()? {
+            None => Entries::of(self.raw)?.copy_from_slice(values),
+            Some((diagonal, other)) => {
+                let (mut inside, mut outside) = (Entries::of(diagonal)?, Entries::of(other)?);
+                let (mut i, mut o) = (0, 0);
+                for (row, &(left, own)) in self.row_offsets.windows(2).zip(&self.split) {
+                    let (a, b) = (row[0] + left as usize, row[0] + (left + own) as usize);
+                    inside[i..i + (b - a)].copy_from_slice(&values[a..b]);
+                    i += b - a;
+                    outside[o..o + (a - row[0])].copy_from_slice(&values[row[0]..a]);
+                    o += a - row[0];
+                    outside[o..o + (row[1] - b)].copy_from_slice(&values[b..row[1]]);
+                    o += row[1] - b;
+                }
+            }
+        }
+        petsc!(MatAssemblyBegin(self.raw, sys::MAT_FINAL_ASSEMBLY))?;
+        petsc!(MatAssemblyEnd(self.raw, sys::MAT_FINAL_ASSEMBLY))?;
+        self.declare_symmetry()
+    }
+
+    /// Tells solvers that A = A^T (or that it is not); holds over later updates.
+    pub fn set_symmetric(&mut self, symmetric: bool) -> Result<()> {
+        self.symmetric = Some(symmetric);
+        self.declare_symmetry()
+    }
+
+    /// Tells solvers that A is symmetric positive definite: Cholesky and CG may be used.
+    pub fn set_spd(&mut self, spd: bool) -> Result<()> {
+        self.spd = Some(spd);
+        self.declare_symmetry()
+    }
+
+    /// An assembly makes PETSc forget what it was told.
+    fn declare_symmetry(&mut self) -> Result<()> {
+        if let Some(symmetric) = self.symmetric {
+            petsc!(MatSetOption(self.raw, sys::MAT_SYMMETRIC, bool_of(symmetric)))?;
+        }
+        if let Some(spd) = self.spd {
+            petsc!(MatSetOption(self.raw, sys::MAT_SPD, bool_of(spd)))?;
+        }
+        Ok(())
+    }
+
+    /// Gives multigrid the rigid-body motions (3 in 2D, 6 in 3D) of the nodes behind the rows.
+    /// `coordinates`: this rank's nodes, `block_size` values each, as many values as rows.
+    pub fn set_rigid_body_near_null_space(&mut self, coordinates: &[f64]) -> Result<()> {
+        if coordinates.len() != self.rows || !(2..=3).contains(&self.block_size) {
+            return Err(Error::Environment(format!(
+                "rigid-body modes need 2 or 3 coordinates per node: {} values for {} rows in \
+                 blocks of {}",
+                coordinates.len(),
+                self.rows,
+                self.block_size
+            )));
+        }
+        let mut positions = self.vector()?;
+        positions.values_mut()?.copy_from_slice(coordinates);
+        let mut modes = null_mut();
+        petsc!(MatNullSpaceCreateRigidBody(positions.raw(), &mut modes))?;
+        petsc!(MatSetNearNullSpace(self.raw, modes))?;
+        petsc!(MatNullSpaceDestroy(&mut modes))
+    }
+
+    /// y = A x.
+    pub fn mult(&self, x: &Vector, y: &mut Vector) -> Result<()> {
+        petsc!(MatMult(self.raw, x.raw(), y.raw()))
+    }
+
+    /// Zero vector with the layout of the rows.
+    pub fn vector(&self) -> Result<Vector> {
+        let mut left = null_mut();
+        petsc!(MatCreateVecs(self.raw, null_mut(), &mut left))?;
+        Vector::own(left, self.rows)
+    }
+
+    /// Rows on this rank.
+    pub fn rows_local(&self) -> usize {
+        self.rows
+    }
+
+    /// Entries on this rank.
+    pub fn entries_local(&self) -> usize {
+        self.row_offsets.last().copied().unwrap_or(0)
+    }
+
+    pub(super) fn raw(&self) -> sys::Mat {
+        self.raw
+    }
+
+    pub(super) fn id(&self) -> u64 {
+        self.id
+    }
+}
+
+impl Drop for Matrix {
+    fn drop(&mut self) {
+        if !self.raw.is_null() && running() {
+            // SAFETY: this is the only owner of the handle; solvers hold their own references.
+            unsafe { sys::MatDestroy(&mut self.raw) };
+        }
+    }
+}
+
+/// The array of stored values of a sequential matrix, to be overwritten.
+struct Entries {
+    raw: sys::Mat,
+    pointer: *mut f64,
+    count: usize,
+}
+
+impl Entries {
+    fn of(raw: sys::Mat) -> Result<Self> {
+        let count = stored(raw)?;
+        let mut pointer = null_mut();
+        petsc!(MatSeqAIJGetArray(raw, &mut pointer))?;
+        Ok(Entries { raw, pointer, count })
+    }
+}
+
+impl std::ops::Deref for Entries {
+    type Target = [f64];
+    fn deref(&self) -> &[f64] {
+        if self.count == 0 {
+            return &[];
+        }
+        // SAFETY: PETSc stores `count` values there, compact after assembly.
+        unsafe { std::slice::from_raw_parts(self.pointer, self.count) }
+    }
+}
+
+impl std::ops::DerefMut for Entries {
+    fn deref_mut(&mut self) -> &mut [f64] {
+        if self.count == 0 {
+            return &mut [];
+        }
+        // SAFETY: as above, and this guard is the array's only user.
+        unsafe { std::slice::from_raw_parts_mut(self.pointer, self.count) }
+    }
+}
+
+impl Drop for Entries {
+    fn drop(&mut self) {
+        // SAFETY: returns what `of` took, and marks the matrix as changed.
+        unsafe { sys::MatSeqAIJRestoreArray(self.raw, &mut self.pointer) };
+    }
+}
+
+/// Entries stored by a sequential matrix.
+fn stored(matrix: sys::Mat) -> Result<usize> {
+    let mut info = std::mem::MaybeUninit::<sys::MatInfo>::zeroed();
+    petsc!(MatGetInfo(matrix, sys::MAT_LOCAL, info.as_mut_ptr()))?;
+    // SAFETY: plain numbers, zeroed and then filled by PETSc.
+    Ok(unsafe { info.assume_init() }.nz_used as usize)
+}
+
+fn check_rows(
+    block_size: usize,
+    own: &std::ops::Range<usize>,
+    rows_global: u64,
+    row_offsets: &[i32],
+    columns: &[i32],
+    values: &[f64],
+) -> Result<()> {
+    let fail = |what: String| Err(Error::Environment(format!("matrix pattern: {what}")));
+    let rows = own.len();
+    if block_size == 0 || rows % block_size != 0 {
+        return fail(format!("{rows} rows are not whole blocks of {block_size}"));
+    }
+    if row_offsets.len() != rows + 1 || row_offsets[0] != 0 {
+        return fail(format!("{} row offsets for {rows} rows, from 0", row_offsets.len()));
+    }
+    if row_offsets[rows] as usize != columns.len() || values.len() != columns.len() {
+        return fail(format!(
+            "offsets end at {}, but there are {} columns and {} values",
+            row_offsets[rows],
+            columns.len(),
+            values.len()
+        ));
+    }
+    for (r, row) in row_offsets.windows(2).enumerate() {
+        let Some(columns) = columns.get(row[0] as usize..row[1] as usize) else {
+            return fail(format!("the offsets of row {} descend", own.start + r));
+        };
+        if !columns.windows(2).all(|c| c[0] < c[1])
+            || columns.first().is_some_and(|&c| c < 0)
+            || columns.last().is_some_and(|&c| c as u64 >= rows_global)
+        {
+            return fail(format!(
+                "the columns of row {} do not ascend within 0..{rows_global}",
+                own.start + r
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wrong_patterns_are_named() {
+        let text = |offsets: &[i32], columns: &[i32]| {
+            check_rows(1, &(4..6), 8, offsets, columns, &vec![0.0; columns.len()])
+                .map_err(|e| e.to_string())
+        };
+        assert!(text(&[0, 2, 3], &[1, 7, 0]).is_ok());
+        assert!(text(&[0, 2, 3], &[7, 1, 0]).unwrap_err().contains("row 4"));
+        assert!(text(&[0, 2, 3], &[1, 7, 8]).unwrap_err().contains("row 5"));
+        assert!(text(&[0, 3, 1], &[1, 7, 8]).unwrap_err().contains("offsets end at 1"));
+        assert!(text(&[0, 1], &[1]).unwrap_err().contains("2 row offsets for 2 rows"));
+    }
+}

@@ -1,0 +1,80 @@
+//! Options database: built-in values that the user can override, and options nobody has read.
+
+use std::collections::BTreeSet;
+use std::ptr::{null, null_mut};
+use std::sync::Mutex;
+
+use super::check::{c_text, petsc, require_running, text_of};
+use super::sys;
+use crate::error::Result;
+
+/// Names set by the program itself: the user is not told when they go unread.
+static BUILT_IN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+
+/// Sets option `name` (with or without its dash) where the user has not set it. "" for a bare
+/// flag. A second call with the same name wins over the first: both are the program's.
+pub fn set_default(name: &str, value: &str) -> Result<()> {
+    require_running()?;
+    let name = dashed(name);
+    let ours = built_in(|names| names.contains(&name));
+    if !ours && is_set(&name)? {
+        return Ok(());
+    }
+    let (key, text) = (c_text(&name)?, c_text(value)?);
+    let text = if value.is_empty() { null() } else { text.as_ptr() };
+    petsc!(PetscOptionsSetValue(null_mut(), key.as_ptr(), text))?;
+    built_in(|names| names.insert(name));
+    Ok(())
+}
+
+/// Is the option set, by whomever? Asking does not count as reading it.
+pub fn is_set(name: &str) -> Result<bool> {
+    require_running()?;
+    let mut text = null_mut();
+    petsc!(PetscOptionsGetAll(null_mut(), &mut text))?;
+    let all = text_of(text);
+    // SAFETY: PETSc allocated the text for the caller; `PetscFree` is a macro over this pointer.
+    unsafe {
+        if let Some(free) = sys::PetscTrFree {
+            free(text.cast(), 0, c"is_set".as_ptr(), c"options.rs".as_ptr());
+        }
+    }
+    let name = dashed(name);
+    Ok(all.split_whitespace().any(|word| word.eq_ignore_ascii_case(&name)))
+}
+
+/// The option's value ("" for a bare flag). Asking counts as reading it.
+pub fn get(name: &str) -> Result<Option<String>> {
+    require_running()?;
+    let key = c_text(&dashed(name))?;
+    let (mut value, mut found) = (null(), sys::PETSC_FALSE);
+    petsc!(PetscOptionsFindPair(null_mut(), null(), key.as_ptr(), &mut value, &mut found))?;
+    Ok((found != sys::PETSC_FALSE).then(|| text_of(value)))
+}
+
+/// Options set by the user and read by no object so far, as `-name value`.
+pub fn unused() -> Result<Vec<String>> {
+    require_running()?;
+    let (mut count, mut names, mut values) = (0, null_mut(), null_mut());
+    petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
+    let mut left = Vec::new();
+    for k in 0..count as usize {
+        // SAFETY: PETSc returned `count` names and values; a value may be null.
+        let (name, value) = unsafe { (text_of(*names.add(k)), text_of(*values.add(k))) };
+        let name = dashed(&name);
+        if !built_in(|names| names.contains(&name)) {
+            left.push(if value.is_empty() { name } else { format!("{name} {value}") });
+        }
+    }
+    petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
+    left.sort();
+    Ok(left)
+}
+
+fn dashed(name: &str) -> String {
+    format!("-{}", name.trim_start_matches('-'))
+}
+
+fn built_in<R>(act: impl FnOnce(&mut BTreeSet<String>) -> R) -> R {
+    act(&mut BUILT_IN.lock().unwrap_or_else(|poisoned| poisoned.into_inner()))
+}

@@ -1,0 +1,351 @@
+//! Newton's method: solve K(x) dx = F(x), x -= dx, until the problem's own test is content.
+//!
+//! PETSc's `SNES` runs the loop, so that its line searches and monitors are at hand under the
+//! prefix; residual, matrix and convergence test are the [`NewtonProblem`]'s. After each callback
+//! the ranks agree on its result: an error or an inadmissible iterate on one rank stops all.
+
+use std::ffi::c_void;
+use std::ptr::{null, null_mut};
+
+use mpi::collective::SystemOperation;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
+
+use super::check::{agree, c_text, petsc, require_running, running, text_of};
+use super::ksp;
+use super::vector::{Values, ValuesMut, index};
+use super::{Ksp, Matrix, Vector, sys};
+use crate::error::{Error, Result};
+
+/// The problem's judgement of an iterate.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Verdict {
+    Continue,
+    Converged,
+    /// Give up; the text says why.
+    Diverged(String),
+}
+
+/// Equations F(x) = 0. Slices are this rank's values.
+///
+/// Callbacks run on all ranks in the same order. They may communicate, but then every rank has
+/// to reach the same calls, also when it has an error to report: an `Err`, `Ok(false)` or
+/// `Diverged` returned by some ranks only takes effect on all of them *after* the callback.
+pub trait NewtonProblem {
+    /// F(x) into `f`. `Ok(false)`: x is outside the domain of the function; a line search then
+    /// shortens the step, otherwise the solve ends unconverged.
+    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool>;
+
+    /// Updates the values of the matrix for x.
+    fn jacobian(&mut self, x: &[f64], matrix: &mut Matrix) -> Result<()>;
+
+    /// Last change of the right-hand side before each linear solve (prescribed displacements:
+    /// the solution dx of K dx = rhs is subtracted from x).
+    fn before_solve(&mut self, rhs: &mut [f64]) -> Result<()>;
+
+    /// Judges each accepted iterate (0: the starting point), whose residual `f` was the last to
+    /// be evaluated. `Converged` at iteration 0 is taken as `Continue`: at least one solve.
+    /// `Converged` counts only if all ranks say so.
+    fn assess(&mut self, iteration: usize, x: &[f64], f: &[f64]) -> Result<Verdict>;
+}
+
+/// How a nonlinear solve ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NewtonOutcome {
+    /// Linear solves.
+    pub iterations: usize,
+    pub linear_iterations_total: usize,
+    pub linear_iterations_max: usize,
+    pub converged: bool,
+    /// "converged", the problem's text, or PETSc's word for the end.
+    pub reason: String,
+}
+
+/// Owner of a PETSc `SNES`; serves any number of solves, each with its own matrix.
+pub struct Snes {
+    raw: sys::SNES,
+    comm: SimpleCommunicator,
+    prefix: String,
+    /// Matrix of the last solve.
+    matrix: u64,
+}
+
+/// What the callbacks see during one solve.
+struct Context<'a, P> {
+    problem: &'a mut P,
+    matrix: &'a mut Matrix,
+    comm: &'a SimpleCommunicator,
+    error: Option<Error>,
+    /// The reason given with `Verdict::Diverged`.
+    diverged: Option<String>,
+    linear_solves: usize,
+    linear_total: usize,
+    linear_max: usize,
+    linear_failure: Option<String>,
+}
+
+impl Snes {
+    /// Newton's method with full steps (`-<prefix>snes_linesearch_type bt` for backtracking) and
+    /// at most `max_solves` linear solves per call of [`Self::solve`]. `prefix` without the dash;
+    /// it serves the linear solver too. Eisenstat-Walker forcing (`snes_ksp_ew`) has no effect.
+    pub fn new(comm: &SimpleCommunicator, prefix: &str, max_solves: usize) -> Result<Self> {
+        require_running()?;
+        let comm = comm.duplicate();
+        let mut snes = Snes { raw: null_mut(), comm, prefix: prefix.into(), matrix: 0 };
+        petsc!(SNESCreate(snes.comm.as_raw(), &mut snes.raw))?;
+        let prefix = c_text(prefix)?;
+        petsc!(SNESSetOptionsPrefix(snes.raw, prefix.as_ptr()))?;
+        petsc!(SNESSetType(snes.raw, sys::SNESNEWTONLS.as_ptr().cast()))?;
+        let mut search = null_mut();
+        petsc!(SNESGetLineSearch(snes.raw, &mut search))?;
+        petsc!(SNESLineSearchSetType(search, sys::SNESLINESEARCHBASIC.as_ptr().cast()))?;
+        snes.set_max_solves(max_solves)?;
+        Ok(snes)
+    }
+
+    /// Most linear solves of the next call of [`Self::solve`].
+    pub fn set_max_solves(&mut self, max_solves: usize) -> Result<()> {
+        let default = f64::from(sys::PETSC_DEFAULT);
+        // Step tolerance 0: after a failed line search PETSc would call a tiny step converged.
+        let (step, solves) = (0.0, index(max_solves)?);
+        petsc!(SNESSetTolerances(self.raw, default, default, step, solves, i32::MAX))
+    }
+
+    /// Built-in options under the prefix: pairs such as `("pc_type", "lu")`. The user's win.
+    /// Call before [`Self::set_from_options`].
+    pub fn set_defaults(&self, options: &[(&str, &str)]) -> Result<()> {
+        for (name, value) in options {
+            super::options::set_default(&format!("{}{name}", self.prefix), value)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the options under the prefix, those of the linear solver included.
+    pub fn set_from_options(&mut self) -> Result<()> {
+        petsc!(SNESSetFromOptions(self.raw))
+    }
+
+    /// The linear solver inside: tolerances, reuse of the preconditioner, description.
+    pub fn ksp(&self) -> Result<Ksp> {
+        let mut inner = null_mut();
+        petsc!(SNESGetKSP(self.raw, &mut inner))?;
+        petsc!(PetscObjectReference(inner.cast()))?;
+        Ok(Ksp::from_reference(inner, &self.prefix))
+    }
+
+    /// Collective. Iterates from `x` to a solution, left in `x`. Not converging is an outcome;
+    /// the error of a callback comes back as it was, the same on all ranks.
+    pub fn solve<P: NewtonProblem>(
+        &mut self,
+        problem: &mut P,
+        matrix: &mut Matrix,
+        x: &mut Vector,
+    ) -> Result<NewtonOutcome> {
+        if self.matrix != 0 && self.matrix != matrix.id() {
+            petsc!(SNESReset(self.raw))?;
+        }
+        self.matrix = matrix.id();
+        let raw_matrix = matrix.raw();
+        let mut context = Context {
+            problem,
+            matrix,
+            comm: &self.comm,
+            error: None,
+            diverged: None,
+            linear_solves: 0,
+            linear_total: 0,
+            linear_max: 0,
+            linear_failure: None,
+        };
+        // The callbacks get this pointer back while `SNESSolve` runs and at no other time.
+        let data: *mut c_void = (&raw mut context).cast();
+        let mut inner = null_mut();
+        petsc!(SNESSetFunction(self.raw, null_mut(), Some(residual::<P>), data))?;
+        petsc!(SNESSetJacobian(self.raw, raw_matrix, raw_matrix, Some(jacobian::<P>), data))?;
+        petsc!(SNESSetConvergenceTest(self.raw, Some(assess::<P>), data, None))?;
+        petsc!(SNESGetKSP(self.raw, &mut inner))?;
+        petsc!(KSPSetPreSolve(inner, Some(before_solve::<P>), data))?;
+        petsc!(KSPSetPostSolve(inner, Some(after_solve::<P>), data))?;
+
+        let solved = petsc!(SNESSolve(self.raw, null_mut(), x.raw()));
+        petsc!(KSPSetPreSolve(inner, None, null_mut()))?;
+        petsc!(KSPSetPostSolve(inner, None, null_mut()))?;
+        if let Some(error) = context.error.take() {
+            // The loop was left in the middle: nothing of its state is of use.
+            petsc!(SNESReset(self.raw))?;
+            return Err(error);
+        }
+        solved?;
+
+        let (mut reason, mut text) = (0, null());
+        petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
+        petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
+        let converged = reason > 0;
+        let reason = match (context.diverged, context.linear_failure) {
+            _ if converged => "converged".to_owned(),
+            (Some(why), _) => why,
+            (None, Some(why)) if reason == sys::SNES_DIVERGED_LINEAR_SOLVE => why,
+            _ => text_of(text),
+        };
+        Ok(NewtonOutcome {
+            iterations: context.linear_solves,
+            linear_iterations_total: context.linear_total,
+            linear_iterations_max: context.linear_max,
+            converged,
+            reason,
+        })
+    }
+}
+
+impl Drop for Snes {
+    fn drop(&mut self) {
+        if !self.raw.is_null() && running() {
+            // SAFETY: this is the only owner of the handle.
+            unsafe { sys::SNESDestroy(&mut self.raw) };
+        }
+    }
+}
+
+impl<P> Context<'_, P> {
+    /// Makes the ranks agree; an error is kept for `solve` and stops PETSc's loop.
+    fn settle<T>(
+        &mut self,
+        result: Result<T>,
+        then: impl FnOnce(&mut Self, T) -> Result<()>,
+    ) -> sys::PetscErrorCode {
+        match agree(self.comm, result).and_then(|value| then(self, value)) {
+            Ok(()) => 0,
+            Err(error) => {
+                self.error.get_or_insert(error);
+                sys::PETSC_ERR_USER as sys::PetscErrorCode
+            }
+        }
+    }
+
+    /// Largest of the ranks' numbers.
+    fn largest(&self, mine: i32) -> i32 {
+        let mut all = mine;
+        self.comm.all_reduce_into(&mine, &mut all, SystemOperation::max());
+        all
+    }
+}
+
+// A panic cannot pass the C code below these functions: `extern "C"` turns it into an abort.
+
+unsafe extern "C" fn residual<P: NewtonProblem>(
+    snes: sys::SNES,
+    x: sys::Vec,
+    f: sys::Vec,
+    data: *mut c_void,
+) -> sys::PetscErrorCode {
+    // SAFETY: `data` is the context that `solve` keeps alive, and no other reference to it exists
+    // during the callback.
+    let context = unsafe { &mut *data.cast::<Context<P>>() };
+    // SAFETY: PETSc's vectors live through the call and are distinct.
+    let result = unsafe { Values::of(x) }.and_then(|x| {
+        let mut f = unsafe { ValuesMut::of(f) }?;
+        context.problem.residual(&x, &mut f)
+    });
+    context.settle(result, |context, inside| {
+        let outside = context.largest(i32::from(!inside)) == 1;
+        if outside { petsc!(SNESSetFunctionDomainError(snes)) } else { Ok(()) }
+    })
+}
+
+unsafe extern "C" fn jacobian<P: NewtonProblem>(
+    _snes: sys::SNES,
+    x: sys::Vec,
+    _matrix: sys::Mat,
+    _preconditioner: sys::Mat,
+    data: *mut c_void,
+) -> sys::PetscErrorCode {
+    // SAFETY: as in `residual`.
+    let context = unsafe { &mut *data.cast::<Context<P>>() };
+    // SAFETY: PETSc's vector lives through the call.
+    let result =
+        unsafe { Values::of(x) }.and_then(|x| context.problem.jacobian(&x, context.matrix));
+    context.settle(result, |_, ()| Ok(()))
+}
+
+unsafe extern "C" fn before_solve<P: NewtonProblem>(
+    _ksp: sys::KSP,
+    rhs: sys::Vec,
+    _solution: sys::Vec,
+    data: *mut c_void,
+) -> sys::PetscErrorCode {
+    // SAFETY: as in `residual`.
+    let context = unsafe { &mut *data.cast::<Context<P>>() };
+    // SAFETY: PETSc's vector lives through the call, and this hook may change it.
+    let result =
+        unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
+    context.settle(result, |_, ()| Ok(()))
+}
+
+unsafe extern "C" fn after_solve<P: NewtonProblem>(
+    inner: sys::KSP,
+    _rhs: sys::Vec,
+    _solution: sys::Vec,
+    data: *mut c_void,
+) -> sys::PetscErrorCode {
+    // SAFETY: as in `residual`.
+    let context = unsafe { &mut *data.cast::<Context<P>>() };
+    context.settle(ksp::outcome(inner), |context, outcome| {
+        context.linear_solves += 1;
+        context.linear_total += outcome.iterations;
+        context.linear_max = context.linear_max.max(outcome.iterations);
+        if !outcome.converged {
+            context.linear_failure = Some(format!(
+                "the linear solver ended with {} after {} iterations",
+                outcome.reason, outcome.iterations
+            ));
+        }
+        Ok(())
+    })
+}
+
+unsafe extern "C" fn assess<P: NewtonProblem>(
+    snes: sys::SNES,
+    iteration: sys::PetscInt,
+    _x_norm: sys::PetscReal,
+    _step_norm: sys::PetscReal,
+    _f_norm: sys::PetscReal,
+    reason: *mut sys::SNESConvergedReason,
+    data: *mut c_void,
+) -> sys::PetscErrorCode {
+    // SAFETY: as in `residual`.
+    let context = unsafe { &mut *data.cast::<Context<P>>() };
+    let iteration = iteration.max(0) as usize;
+    let result = judge(context, snes, iteration);
+    context.settle(result, |context, verdict| {
+        let (code, text) = match verdict {
+            Verdict::Converged if iteration > 0 => (0, None),
+            Verdict::Converged | Verdict::Continue => (1, None),
+            Verdict::Diverged(text) => (2, Some(text)),
+        };
+        let word = match context.largest(code) {
+            0 => sys::SNES_CONVERGED_FNORM_ABS,
+            1 => sys::SNES_CONVERGED_ITERATING,
+            _ => {
+                let elsewhere = || "the iteration diverged on another rank".to_owned();
+                context.diverged = Some(text.unwrap_or_else(elsewhere));
+                sys::SNES_DIVERGED_INNER
+            }
+        };
+        // SAFETY: PETSc passes the place for the answer.
+        unsafe { *reason = word };
+        Ok(())
+    })
+}
+
+fn judge<P: NewtonProblem>(
+    context: &mut Context<P>,
+    snes: sys::SNES,
+    iteration: usize,
+) -> Result<Verdict> {
+    let (mut x, mut f) = (null_mut(), null_mut());
+    petsc!(SNESGetSolution(snes, &mut x))?;
+    petsc!(SNESGetFunction(snes, &mut f, null_mut(), null_mut()))?;
+    // SAFETY: the solver's vectors live through the convergence test and nobody writes them.
+    let (x, f) = unsafe { (Values::of(x)?, Values::of(f)?) };
+    context.problem.assess(iteration, &x, &f)
+}

@@ -1,0 +1,74 @@
+//! Runs things under `mpirun` from ordinary tests, with a time limit and one job at a time.
+#![allow(dead_code)]
+
+use std::ffi::OsStr;
+use std::process::{Command, Output, Stdio};
+use std::sync::Mutex;
+
+use mpi::environment::Universe;
+
+/// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
+const TIME_LIMIT: &str = "120";
+/// Set in the ranks of [`on_ranks`].
+const INSIDE: &str = "MPM_PAR_TEST_RANK";
+static ONE_JOB: Mutex<()> = Mutex::new(());
+
+/// Runs `command` (program, then its arguments) on `n` ranks with extra environment variables.
+pub fn mpirun<S: AsRef<OsStr>>(n: usize, command: &[S], env: &[(&str, &str)]) -> Output {
+    let _alone = ONE_JOB.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let mut job = Command::new("mpirun");
+    job.args(["-n", &n.to_string(), "--timeout", TIME_LIMIT]).args(command).stdin(Stdio::null());
+    for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] {
+        job.env(name, "1");
+    }
+    // More ranks than cores, none bound, and waiting ranks give way.
+    job.env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+        .env("OMPI_MCA_hwloc_base_binding_policy", "none")
+        .env("OMPI_MCA_mpi_yield_when_idle", "1")
+        .env("OMP_NUM_THREADS", "1")
+        .env_remove("PETSC_OPTIONS");
+    job.envs(env.iter().copied());
+    job.output().expect("mpirun is on the PATH")
+}
+
+/// Body of a test on several rank counts. The ordinary test process starts its own executable
+/// under `mpirun` for each of `counts`, restricted to the test `name` (its path as the harness
+/// prints it); the ranks come here again and run `body`.
+pub fn on_ranks(name: &str, counts: &[usize], body: impl FnOnce(&Universe)) {
+    on_ranks_with(name, counts, &[], body);
+}
+
+/// [`on_ranks`] with environment variables for the ranks.
+pub fn on_ranks_with(
+    name: &str,
+    counts: &[usize],
+    env: &[(&str, &str)],
+    body: impl FnOnce(&Universe),
+) {
+    if std::env::var(INSIDE).as_deref() == Ok(name) {
+        let (universe, _) = mpi::initialize_with_threading(mpi::Threading::Funneled)
+            .expect("MPI was not started before");
+        mpm_par::petsc::session::install_panic_hook();
+        body(&universe);
+        return;
+    }
+    let program = std::env::current_exe().expect("the path of this test");
+    let command: Vec<&OsStr> = vec![
+        program.as_os_str(),
+        OsStr::new("--exact"),
+        OsStr::new(name),
+        OsStr::new("--nocapture"),
+        OsStr::new("--test-threads=1"),
+    ];
+    let env: Vec<(&str, &str)> = env.iter().copied().chain([(INSIDE, name)]).collect();
+    for &n in counts {
+        let output = mpirun(n, &command, &env);
+        let stdout = String::from_utf8_lossy(&output.stdout);
+        assert!(
+            output.status.success() && stdout.matches("1 passed").count() == n,
+            "{name} failed on {n} ranks ({})\n{stdout}\n{}",
+            output.status,
+            String::from_utf8_lossy(&output.stderr)
+        );
+    }
+}

@@ -1,0 +1,358 @@
+//! The PETSc wrappers on one to four ranks, ranks without rows among them.
+
+mod common;
+
+use common::{on_ranks, on_ranks_with};
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::Communicator;
+use mpm_par::error::{Error, Result};
+use mpm_par::petsc::{self, Ksp, Matrix, NewtonProblem, Session, Snes, Vector, Verdict};
+
+/// This rank's rows of a system of `n` rows in blocks of `block`; rank 1 gets none.
+fn share(comm: &SimpleCommunicator, n: usize, block: usize) -> std::ops::Range<usize> {
+    let (rank, size) = (comm.rank() as usize, comm.size() as usize);
+    let workers = if size > 2 { size - 1 } else { size };
+    let place = match (size > 2, rank) {
+        (true, 0) => 0,
+        (true, 1) => return cut(n, block, workers, 1)..cut(n, block, workers, 1),
+        (true, r) => r - 1,
+        (false, r) => r,
+    };
+    cut(n, block, workers, place)..cut(n, block, workers, place + 1)
+}
+
+fn cut(n: usize, block: usize, workers: usize, place: usize) -> usize {
+    n / block * place / workers * block
+}
+
+/// Rows `own` of the tridiagonal matrix (-1, 2 + shift, -1), plus entries in the far corners.
+fn tridiagonal(
+    own: &std::ops::Range<usize>,
+    n: usize,
+    shift: f64,
+) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
+    let (mut offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    for row in own.clone() {
+        let mut entries: Vec<(usize, f64)> = vec![(row, 2.0 + shift)];
+        if row > 0 {
+            entries.push((row - 1, -1.0));
+        }
+        if row + 1 < n {
+            entries.push((row + 1, -1.0));
+        }
+        if row == 0 {
+            entries.push((n - 1, -0.25));
+        }
+        if row == n - 1 {
+            entries.push((0, -0.25));
+        }
+        entries.sort_by_key(|e| e.0);
+        columns.extend(entries.iter().map(|e| e.0 as i32));
+        values.extend(entries.iter().map(|e| e.1));
+        offsets.push(columns.len() as i32);
+    }
+    (offsets, columns, values)
+}
+
+fn product(row: usize, n: usize, shift: f64, x: impl Fn(usize) -> f64) -> f64 {
+    let (_, columns, values) = tridiagonal(&(row..row + 1), n, shift);
+    columns.iter().zip(&values).map(|(&c, v)| v * x(c as usize)).sum()
+}
+
+#[test]
+fn vectors_hold_and_reduce_values() {
+    on_ranks("vectors_hold_and_reduce_values", &[1, 2, 4], |universe| {
+        let _session = Session::start(universe, &[], &[]).unwrap();
+        let world = universe.world();
+        let own = share(&world, 12, 2);
+        let mut v = Vector::new(&world, own.len(), 2).unwrap();
+        assert_eq!(v.first_row().unwrap(), own.start);
+        for (value, row) in v.values_mut().unwrap().iter_mut().zip(own.clone()) {
+            *value = row as f64;
+        }
+        let mut w = v.duplicate().unwrap();
+        assert_eq!(w.norm().unwrap(), 0.0);
+        w.set(2.0).unwrap();
+        assert_eq!(v.dot(&w).unwrap(), 2.0 * 66.0);
+        assert_eq!(v.norm_max().unwrap(), 11.0);
+        w.copy_from(&v).unwrap();
+        w.axpy(-1.0, &v).unwrap();
+        assert_eq!(w.norm().unwrap(), 0.0);
+        assert_eq!(v.values().unwrap().len(), own.len());
+    });
+}
+
+#[test]
+fn matrix_multiplies_updates_and_refuses() {
+    on_ranks("matrix_multiplies_updates_and_refuses", &[1, 2, 3, 4], |universe| {
+        let _session = Session::start(universe, &[], &[]).unwrap();
+        let world = universe.world();
+        let n = 20;
+        let own = share(&world, n, 2);
+        let (offsets, columns, values) = tridiagonal(&own, n, 0.0);
+        let mut a = Matrix::from_csr(&world, 2, own.len(), &offsets, &columns, &values).unwrap();
+        a.set_symmetric(true).unwrap();
+        let mut x = a.vector().unwrap();
+        let mut y = x.duplicate().unwrap();
+        for (value, row) in x.values_mut().unwrap().iter_mut().zip(own.clone()) {
+            *value = (row * row) as f64;
+        }
+        for shift in [0.0, 1.5, -3.0] {
+            let (_, _, values) = tridiagonal(&own, n, shift);
+            a.update(&values).unwrap();
+            a.mult(&x, &mut y).unwrap();
+            for (y, row) in y.values().unwrap().iter().zip(own.clone()) {
+                let expected = product(row, n, shift, |c| (c * c) as f64);
+                assert!((y - expected).abs() < 1e-12, "row {row}: {y} for {expected}");
+            }
+        }
+        assert!(a.update(&[0.0]).is_err());
+
+        // One rank's bad column is every rank's error, with that rank's text.
+        let mut bad = columns.clone();
+        if own.contains(&0) {
+            bad.swap(0, 1);
+        }
+        let error = Matrix::from_csr(&world, 2, own.len(), &offsets, &bad, &values).unwrap_err();
+        assert!(error.to_string().contains("row 0"), "{error}");
+        assert!(matches!(error, Error::Environment(_)));
+    });
+}
+
+#[test]
+fn linear_solver_follows_the_matrix() {
+    on_ranks("linear_solver_follows_the_matrix", &[1, 2, 3, 4], |universe| {
+        let table = [("a_ksp_rtol".to_string(), "1e-12".to_string())];
+        let session = Session::start(universe, &table, &[]).unwrap();
+        let world = universe.world();
+        let methods: [&[(&str, &str)]; 3] = [
+            &[("ksp_type", "cg"), ("pc_type", "jacobi"), ("ksp_rtol", "1")],
+            &[("ksp_type", "preonly"), ("pc_type", "lu"), ("pc_factor_mat_solver_type", "mumps")],
+            &[("ksp_type", "cg"), ("pc_type", "gamg")],
+        ];
+        for (method, options) in methods.iter().enumerate() {
+            let mut ksp = Ksp::new(&world, "a_").unwrap();
+            ksp.set_defaults(options).unwrap();
+            ksp.set_from_options().unwrap();
+            // Sizes differ: the solver must forget the matrix before.
+            for n in [24, 60] {
+                let own = share(&world, n, 1);
+                let (offsets, columns, values) = tridiagonal(&own, n, 0.5);
+                let mut a =
+                    Matrix::from_csr(&world, 1, own.len(), &offsets, &columns, &values).unwrap();
+                a.set_spd(true).unwrap();
+                let mut b = a.vector().unwrap();
+                let mut x = a.vector().unwrap();
+                for shift in [0.5, 2.0] {
+                    let (_, _, values) = tridiagonal(&own, n, shift);
+                    a.update(&values).unwrap();
+                    for (b, row) in b.values_mut().unwrap().iter_mut().zip(own.clone()) {
+                        *b = product(row, n, shift, |c| 1.0 + c as f64);
+                    }
+                    ksp.set_operators(&a).unwrap();
+                    let outcome = ksp.solve(&b, &mut x).unwrap().require("a test").unwrap();
+                    assert_eq!(outcome.iterations == 1, method == 1, "{outcome:?}");
+                    for (x, row) in x.values().unwrap().iter().zip(own.clone()) {
+                        assert!((x - 1.0 - row as f64).abs() < 1e-8, "{method}: {row}: {x}");
+                    }
+                }
+            }
+        }
+        assert!(session.unused_options().unwrap().is_empty());
+
+        // A singular matrix is an outcome with a readable reason.
+        let own = share(&world, 6, 1);
+        let offsets: Vec<i32> = (0..=own.len() as i32).collect();
+        let columns: Vec<i32> = own.clone().map(|r| r as i32).collect();
+        let values: Vec<f64> = own.clone().map(|r| if r == 3 { 0.0 } else { 1.0 }).collect();
+        let a = Matrix::from_csr(&world, 1, own.len(), &offsets, &columns, &values).unwrap();
+        let mut ksp = Ksp::new(&world, "s_").unwrap();
+        let mumps = ("pc_factor_mat_solver_type", "mumps");
+        ksp.set_defaults(&[("ksp_type", "preonly"), ("pc_type", "lu"), mumps]).unwrap();
+        ksp.set_from_options().unwrap();
+        ksp.set_operators(&a).unwrap();
+        let (b, mut x) = (a.vector().unwrap(), a.vector().unwrap());
+        let outcome = ksp.solve(&b, &mut x).unwrap();
+        assert!(!outcome.converged && outcome.reason.contains("pivot"), "{outcome:?}");
+        assert!(matches!(outcome.require("the test"), Err(Error::Run(_))));
+    });
+}
+
+/// x_i^3 + (T x)_i = that of x_i = 1 + i/n; row 0 is prescribed through an identity row.
+struct Cubic<'a> {
+    comm: &'a SimpleCommunicator,
+    own: std::ops::Range<usize>,
+    n: usize,
+    fail_in: &'static str,
+    log: Vec<String>,
+}
+
+impl Cubic<'_> {
+    fn exact(&self, row: usize) -> f64 {
+        1.0 + row as f64 / self.n as f64
+    }
+
+    fn fail<T>(&self, place: &str, value: T) -> Result<T> {
+        if self.fail_in == place && self.comm.rank() == self.comm.size() - 1 {
+            return Err(Error::Run(format!("{place} failed on the last rank")));
+        }
+        Ok(value)
+    }
+}
+
+/// The diagonal part only couples through neighbours' values of the exact solution: rows are
+/// independent but for the matrix, which is what the tests are about.
+impl NewtonProblem for Cubic<'_> {
+    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+        for (k, row) in self.own.clone().enumerate() {
+            f[k] = if row == 0 { 0.0 } else { x[k].powi(3) - self.exact(row).powi(3) };
+        }
+        if self.fail_in == "domain" && self.comm.rank() == self.comm.size() - 1 {
+            return Ok(self.log.is_empty());
+        }
+        self.fail("residual", true)
+    }
+
+    fn jacobian(&mut self, x: &[f64], matrix: &mut Matrix) -> Result<()> {
+        let values: Vec<f64> = self
+            .own
+            .clone()
+            .enumerate()
+            .map(|(k, row)| if row == 0 { 1.0 } else { 3.0 * x[k] * x[k] })
+            .collect();
+        matrix.update(&values)?;
+        self.fail("jacobian", ())
+    }
+
+    fn before_solve(&mut self, rhs: &mut [f64]) -> Result<()> {
+        // The prescribed row starts at 3 and has to reach its value in the first step.
+        if self.own.contains(&0) && self.log.len() == 1 {
+            rhs[0] = 3.0 - self.exact(0);
+        }
+        self.fail("before_solve", ())
+    }
+
+    fn assess(&mut self, iteration: usize, _x: &[f64], f: &[f64]) -> Result<Verdict> {
+        let largest = f.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        self.log.push(format!("{iteration}"));
+        self.fail("assess", ())?;
+        if self.fail_in == "verdict" && self.comm.rank() == 0 && iteration == 2 {
+            return Ok(Verdict::Diverged("the test gave up".into()));
+        }
+        Ok(if largest < 1e-10 { Verdict::Converged } else { Verdict::Continue })
+    }
+}
+
+#[test]
+fn newton_solves_and_stops_together() {
+    on_ranks("newton_solves_and_stops_together", &[1, 2, 3, 4], |universe| {
+        let _session = Session::start(universe, &[], &[]).unwrap();
+        let world = universe.world();
+        let mut snes = Snes::new(&world, "qs_", 20).unwrap();
+        snes.set_defaults(&[("ksp_type", "gmres"), ("pc_type", "jacobi")]).unwrap();
+        snes.set_from_options().unwrap();
+        assert_eq!(snes.ksp().unwrap().describe().unwrap(), "gmres + jacobi");
+
+        let mut run = |n: usize, fail_in: &'static str, start: f64| {
+            let own = share(&world, n, 1);
+            let offsets: Vec<i32> = (0..=own.len() as i32).collect();
+            let columns: Vec<i32> = own.clone().map(|r| r as i32).collect();
+            let ones = vec![1.0; own.len()];
+            let mut a = Matrix::from_csr(&world, 1, own.len(), &offsets, &columns, &ones).unwrap();
+            let mut x = a.vector().unwrap();
+            x.set(start).unwrap();
+            let mut problem = Cubic { comm: &world, own: own.clone(), n, fail_in, log: vec![] };
+            let outcome = snes.solve(&mut problem, &mut a, &mut x);
+            let error = own
+                .clone()
+                .zip(x.values().unwrap().iter())
+                .fold(0.0, |m: f64, (r, v)| m.max((v - problem.exact(r)).abs()));
+            (outcome, error, problem.log)
+        };
+
+        // Three sizes with one solver, and errors in between that must leave it usable.
+        for (n, place) in [(8, "residual"), (30, "jacobian"), (12, "before_solve"), (9, "assess")] {
+            let (outcome, error, log) = run(n, "", 3.0);
+            let outcome = outcome.unwrap();
+            assert!(outcome.converged && outcome.reason == "converged", "{outcome:?}");
+            assert!(error < 1e-10, "{error}");
+            assert_eq!(log.len(), outcome.iterations + 1);
+            assert_eq!(outcome.linear_iterations_total, outcome.iterations);
+            assert_eq!(outcome.linear_iterations_max, 1);
+            let (outcome, _, _) = run(n, place, 3.0);
+            let text = outcome.unwrap_err().to_string();
+            assert_eq!(text, format!("{place} failed on the last rank"));
+        }
+
+        let outcome = run(8, "verdict", 3.0).0.unwrap();
+        assert!(!outcome.converged && outcome.iterations == 2, "{outcome:?}");
+        if world.rank() == 0 {
+            assert_eq!(outcome.reason, "the test gave up");
+        }
+        let outcome = run(8, "domain", 3.0).0.unwrap();
+        assert!(!outcome.converged && outcome.reason.contains("DOMAIN"), "{outcome:?}");
+        let (outcome, _, log) = run(8, "", 3.0);
+        assert!(outcome.unwrap().converged && log.len() > 3);
+        snes.set_max_solves(2).unwrap();
+    });
+}
+
+#[test]
+fn later_options_win() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join(".petscrc"),
+        "-t_a rc\n-t_b rc\n-t_c rc\n-t_d rc\n-t_unread 1\n",
+    )
+    .unwrap();
+    let home = folder.path().to_str().unwrap();
+    let env = [("HOME", home), ("PETSC_OPTIONS", "-t_c env -t_d env -qs_nonsense 3")];
+    on_ranks_with("later_options_win", &[1, 2], &env, |universe| {
+        let table = [
+            ("t_b".to_string(), "table".to_string()),
+            ("t_c".to_string(), "table".to_string()),
+            ("t_d".to_string(), "table".to_string()),
+            ("log_view".to_string(), format!(":{}/log.txt", std::env::var("HOME").unwrap())),
+        ];
+        let words = ["-t_d", "words", "-t_flag"].map(String::from);
+        let session = Session::start(universe, &table, &words).unwrap();
+        for (name, expected) in
+            [("t_a", "rc"), ("t_b", "table"), ("t_c", "env"), ("t_d", "words"), ("t_e", "built-in")]
+        {
+            session.set_default_option(name, "built-in").unwrap();
+            assert_eq!(petsc::options::get(name).unwrap().as_deref(), Some(expected));
+        }
+        assert_eq!(petsc::options::get("t_flag").unwrap().as_deref(), Some(""));
+        assert_eq!(petsc::options::get("t_none").unwrap(), None);
+        session.set_default_option("t_quiet", "1").unwrap();
+        assert_eq!(session.unused_options().unwrap(), ["-qs_nonsense 3", "-t_unread 1"]);
+        let stages = petsc::log::Stages::register().unwrap();
+        let outer = stages.enter(petsc::log::Phase::Solve).unwrap();
+        drop(stages.enter(petsc::log::Phase::Assemble).unwrap());
+        drop(outer);
+        drop(session);
+        let text = std::fs::read_to_string(format!("{}/log.txt", std::env::var("HOME").unwrap()));
+        if universe.world().rank() == 0 {
+            let text = text.unwrap();
+            assert!(text.contains("assemble:") && text.contains("solve:"), "{text}");
+        }
+        assert!(Vector::new(&universe.world(), 1, 1).is_err());
+    });
+}
+
+#[test]
+fn a_panic_on_one_rank_ends_all() {
+    const NAME: &str = "a_panic_on_one_rank_ends_all";
+    let program = std::env::current_exe().unwrap();
+    if std::env::var("PANIC_HERE").is_ok() {
+        let universe = mpi::initialize().unwrap();
+        let _session = Session::start(&universe, &[], &[]).unwrap();
+        assert!(universe.world().rank() != 1, "on purpose");
+        let v = Vector::new(&universe.world(), 1, 1).unwrap();
+        v.norm().unwrap();
+        return;
+    }
+    let command = [program.to_str().unwrap(), "--exact", NAME, "--nocapture"];
+    let output = common::mpirun(2, &command, &[("PANIC_HERE", "1")]);
+    assert_eq!(output.status.code(), Some(101));
+}
