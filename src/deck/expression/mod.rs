@@ -1,0 +1,195 @@
+//! Expressions in the deck: numbers or formulas of X, Y, Z, x, y, z, s, t.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `mod.rs` | [`Expression`]: evaluation and symbolic derivatives on the exmex crate |
+//! | `grammar.rs` | the deck's grammar, rewritten to the fully parenthesised form that exmex reads |
+//! | `operators.rs` | the operators and functions known to both |
+
+mod grammar;
+mod operators;
+#[cfg(test)]
+mod tests;
+
+use std::sync::Arc;
+
+use exmex::{Differentiate, Express, FlatEx};
+
+use operators::Operators;
+
+/// Values of the variables. In 2D the third components are zero.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Scope {
+    /// X, Y, Z: start position of the node or point, m.
+    pub initial: [f64; 3],
+    /// x, y, z: current position, m.
+    pub current: [f64; 3],
+    /// s: load factor, 0 to 1.
+    pub load_factor: f64,
+    /// t: time, s.
+    pub time: f64,
+}
+
+impl Scope {
+    fn value(&self, variable: Variable) -> f64 {
+        match variable {
+            Variable::InitialX => self.initial[0],
+            Variable::InitialY => self.initial[1],
+            Variable::InitialZ => self.initial[2],
+            Variable::CurrentX => self.current[0],
+            Variable::CurrentY => self.current[1],
+            Variable::CurrentZ => self.current[2],
+            Variable::LoadFactor => self.load_factor,
+            Variable::Time => self.time,
+        }
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Variable {
+    InitialX,
+    InitialY,
+    InitialZ,
+    CurrentX,
+    CurrentY,
+    CurrentZ,
+    LoadFactor,
+    Time,
+}
+
+impl Variable {
+    pub const ALL: [Variable; 8] = [
+        Variable::InitialX,
+        Variable::InitialY,
+        Variable::InitialZ,
+        Variable::CurrentX,
+        Variable::CurrentY,
+        Variable::CurrentZ,
+        Variable::LoadFactor,
+        Variable::Time,
+    ];
+
+    /// The name in formulas.
+    pub fn name(self) -> &'static str {
+        match self {
+            Variable::InitialX => "X",
+            Variable::InitialY => "Y",
+            Variable::InitialZ => "Z",
+            Variable::CurrentX => "x",
+            Variable::CurrentY => "y",
+            Variable::CurrentZ => "z",
+            Variable::LoadFactor => "s",
+            Variable::Time => "t",
+        }
+    }
+
+    fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|variable| variable.name() == name)
+    }
+}
+
+/// A parsed formula or a constant. Cloning is cheap; equality is equality of the text.
+#[derive(Debug, Clone)]
+pub struct Expression {
+    text: String,
+    constant: Option<f64>,
+    /// The formula and the variables it takes, in its order; absent for constants.
+    formula: Option<Arc<Formula>>,
+}
+
+#[derive(Debug)]
+struct Formula {
+    flat: FlatEx<f64, Operators>,
+    variables: Vec<Variable>,
+}
+
+impl PartialEq for Expression {
+    fn eq(&self, other: &Self) -> bool {
+        self.text == other.text
+    }
+}
+
+impl Expression {
+    /// Parses a formula; the message says what is wrong and lists variables and functions.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let normal = grammar::normalise(text)?;
+        Self::from_normal_form(text.to_string(), &normal)
+    }
+
+    pub fn constant(value: f64) -> Self {
+        Expression { text: value.to_string(), constant: Some(value), formula: None }
+    }
+
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The value, if it depends on nothing.
+    pub fn as_constant(&self) -> Option<f64> {
+        self.constant
+    }
+
+    pub fn depends_on(&self, variable: Variable) -> bool {
+        self.formula.as_ref().is_some_and(|formula| formula.variables.contains(&variable))
+    }
+
+    /// True if it contains `s` or `t`.
+    pub fn depends_on_time(&self) -> bool {
+        self.depends_on(Variable::LoadFactor) || self.depends_on(Variable::Time)
+    }
+
+    /// The value; not a number where the formula has none (for example `ln(-1)`).
+    pub fn value(&self, scope: &Scope) -> f64 {
+        if let Some(value) = self.constant {
+            return value;
+        }
+        let Some(formula) = &self.formula else { return f64::NAN };
+        let mut values = [0.0; Variable::ALL.len()];
+        let count = formula.variables.len();
+        for (value, &variable) in values.iter_mut().zip(&formula.variables) {
+            *value = scope.value(variable);
+        }
+        formula.flat.eval(&values[..count]).unwrap_or(f64::NAN)
+    }
+
+    /// Symbolic partial derivative. Error: the formula contains a function or an operator
+    /// without a derivative rule (comparisons, `min`, `max`, `if`, `abs`, ...).
+    pub fn derivative(&self, variable: Variable) -> Result<Expression, String> {
+        let Some(formula) = &self.formula else { return Ok(Self::constant(0.0)) };
+        let Some(index) = formula.variables.iter().position(|&v| v == variable) else {
+            return Ok(Self::constant(0.0));
+        };
+        let refused = |why: String| {
+            format!(
+                "\"{}\" has no symbolic derivative with respect to {}: {why}; use + - * / ^ and {}",
+                self.text,
+                variable.name(),
+                operators::DIFFERENTIABLE.join(" ")
+            )
+        };
+        if let Some(name) = operators::without_derivative(formula.flat.unparse()) {
+            return Err(refused(format!("`{name}` has no rule")));
+        }
+        let derived = formula.flat.clone().partial(index).map_err(|e| refused(e.to_string()))?;
+        let normal = derived.unparse().to_string();
+        Self::from_normal_form(normal.clone(), &normal)
+    }
+
+    fn from_normal_form(text: String, normal: &str) -> Result<Self, String> {
+        let flat = FlatEx::<f64, Operators>::parse(normal)
+            .map_err(|e| format!("cannot read \"{text}\": {e}"))?;
+        let variables: Vec<Variable> = flat
+            .var_names()
+            .iter()
+            .map(|name| {
+                Variable::from_name(name).ok_or_else(|| grammar::unknown_name(&text, name))
+            })
+            .collect::<Result<_, _>>()?;
+        if variables.is_empty() {
+            let value = flat.eval(&[]).map_err(|e| format!("cannot read \"{text}\": {e}"))?;
+            return Ok(Expression { text, constant: Some(value), formula: None });
+        }
+        let formula = Some(Arc::new(Formula { flat, variables }));
+        Ok(Expression { text, constant: None, formula })
+    }
+}
