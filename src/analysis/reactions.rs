@@ -1,0 +1,50 @@
+//! What the boundaries bear: force, sum of nodal magnitudes (Rotation Figure 7) and torque, per
+//! named boundary.
+
+use crate::assembly::Numbering;
+use crate::assembly::conditions::Conditions;
+use crate::deck::model::Boundary;
+use crate::grid::Grid;
+use crate::output::history::Reaction;
+use crate::parallel::World;
+
+/// Sums f = f_int - f_ext over the degrees of freedom each boundary holds. The torque is about
+/// the boundary's centre of rotation, else about the origin. Collective.
+pub fn reactions<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    numbering: &Numbering,
+    boundaries: &[Boundary],
+    conditions: &Conditions,
+    internal: &[f64],
+    external: &[f64],
+) -> Vec<Reaction> {
+    boundaries
+        .iter()
+        .zip(&conditions.members)
+        .map(|(boundary, members)| {
+            let centre = boundary.rotation.as_ref().map_or([0.0; 2], |rotation| {
+                [rotation.centre[0], rotation.centre[1]]
+            });
+            let mut sums = [0.0; 5];
+            let mut at = 0;
+            while at < members.len() {
+                let node = members[at] as usize / D;
+                let mut force = [0.0; 3];
+                while at < members.len() && members[at] as usize / D == node {
+                    let dof = members[at] as usize;
+                    force[dof % D] = internal[dof] - external[dof];
+                    at += 1;
+                }
+                let x = grid.node_position(numbering.nodes[node]);
+                for (sum, f) in sums.iter_mut().zip(force) {
+                    *sum += f;
+                }
+                sums[3] += force.iter().map(|f| f * f).sum::<f64>().sqrt();
+                sums[4] += (x[0] - centre[0]) * force[1] - (x[1] - centre[1]) * force[0];
+            }
+            let sums = world.sum_slice(&sums);
+            Reaction { force: [sums[0], sums[1], sums[2]], sum_abs: sums[3], torque: sums[4] }
+        })
+        .collect()
+}

@@ -1,0 +1,136 @@
+//! From a checked deck to points on their ranks: seed, partition, migrate, place point forces.
+
+use crate::deck::Deck;
+use crate::deck::model::{self, Load};
+use crate::error::{Error, Result};
+use crate::ghost::stencil::Penalty;
+use crate::grid::{Grid, Lattice};
+use crate::material::Material;
+use crate::parallel::{self, Partition, World};
+use crate::points::Points;
+use crate::points::seed::{self, Share};
+
+use super::discretise::Model;
+
+/// Builds the model and this rank's points. Collective.
+pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {
+    let grid = build_grid(&deck)?;
+    let share = Share { rank: world.rank(), ranks: world.size() };
+    let mut points = world.fail_together(seed::seed(&deck, &grid, share))?;
+    check_bodies(world, &deck, &grid, &points)?;
+    let partition = Partition::build(world, &grid, deck.parallel.brick, &points, None)?;
+    parallel::migrate(world, &partition, &grid, &mut points)?;
+    place_point_forces(world, &deck, &mut points)?;
+
+    let materials = deck
+        .bodies
+        .iter()
+        .map(|body| Material::from_deck(&deck.materials[body.material].model))
+        .collect();
+    let penalties = deck
+        .bodies
+        .iter()
+        .map(|body| {
+            let young = deck.materials[body.material].model.young();
+            deck.ghost.as_ref().map_or(Penalty { stiffness: 0.0, mass: 0.0 }, |ghost| {
+                Penalty::of_body(ghost, young, body.density)
+            })
+        })
+        .collect();
+    Ok((Model { deck, grid, partition, materials, penalties }, points))
+}
+
+fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
+    match &deck.grid {
+        model::Grid::Lattice(lattice) => {
+            let axis = |values: &[f64]| std::array::from_fn(|a| values[a]);
+            Ok(Grid::Lattice(Lattice {
+                origin: axis(&lattice.origin),
+                spacing: axis(&lattice.spacing),
+                cells: std::array::from_fn(|a| lattice.cells[a]),
+            }))
+        }
+        model::Grid::Mesh(_) => Err(Error::Input("meshes are not wired yet".into())),
+    }
+}
+
+/// Every body has points, all inside the grid.
+fn check_bodies<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    grid: &Grid<D>,
+    points: &Points<D>,
+) -> Result<()> {
+    let mut counts = vec![0.0; deck.bodies.len()];
+    for &body in &points.body {
+        counts[body as usize] += 1.0;
+    }
+    for (body, count) in deck.bodies.iter().zip(world.sum_slice(&counts)) {
+        if count == 0.0 {
+            return Err(Error::Input(format!(
+                "body \"{}\" has no points: its shape holds no point of its seeding inside the \
+                 grid; check shape, units and points_per_cell",
+                body.name
+            )));
+        }
+    }
+    let outside = (0..points.len()).find(|&p| grid.locate(&points.position[p]).is_none()).map(|p| {
+        format!(
+            "body \"{}\": point {} at {:?} lies outside the grid; enlarge the grid or move the body",
+            deck.bodies[points.body[p] as usize].name, points.id[p], points.position[p]
+        )
+    });
+    match world.first_message(outside) {
+        Some(message) => Err(Error::Input(message)),
+        None => Ok(()),
+    }
+}
+
+/// Shares each point load equally among the points nearest to its places; of points equally
+/// near (to 1e-9 of the distance scale) the one with the smallest id takes it.
+fn place_point_forces<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    points: &mut Points<D>,
+) -> Result<()> {
+    for load in &deck.loads {
+        let Load::Point { body, nearest, force } = load else { continue };
+        for place in nearest {
+            let distance = |p: usize| -> f64 {
+                let x = &points.position_initial[p];
+                x.iter().zip(place).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+            };
+            let own: Vec<usize> =
+                (0..points.len()).filter(|&p| points.body[p] as usize == *body).collect();
+            let best = world.min(own.iter().map(|&p| distance(p)).fold(f64::INFINITY, f64::min));
+            let slack = 1e-9 * own.first().map_or(0.0, |&p| points.half_length_initial[p][0]);
+            let id = own
+                .iter()
+                .filter(|&&p| distance(p) <= best + slack)
+                .map(|&p| points.id[p])
+                .min()
+                .unwrap_or(u64::MAX);
+            let id = world.min_u64(id);
+            if let Some(p) = (0..points.len()).find(|&p| points.id[p] == id) {
+                for (held, f) in points.point_force[p].iter_mut().zip(force) {
+                    *held += f / nearest.len() as f64;
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Memory that the plan expects, bytes: points with influences, and matrix entries.
+pub fn estimated_memory<const D: usize>(deck: &Deck, points: usize, cells: usize) -> usize {
+    let nodes_each = match (deck.method.basis, D) {
+        (model::Basis::Mpm, _) => 1 << D,
+        (model::Basis::Gimp, 2) => 7,
+        (model::Basis::Gimp, _) => 18,
+        _ => 4 << D,
+    };
+    let row: usize = if D == 2 { 25 } else { 80 };
+    let per_point = 8 * Points::<D>::record_words() + nodes_each * (16 + 8 * D);
+    let per_node = row * (8 * D * D * 3 + 8);
+    points * per_point + cells * per_node
+}

@@ -1,0 +1,56 @@
+//! Figures of merit: a computed point field against its exact value (Lagrangian eq. 42).
+
+use std::collections::BTreeMap;
+
+use crate::assembly::external::scope_of;
+use crate::deck::model::{Verify, VerifyNorm};
+use crate::error::Result;
+use crate::output::PointField;
+use crate::parallel::World;
+use crate::points::Points;
+
+/// Evaluates all entries of the deck at the present state. Collective.
+pub fn figures<const D: usize>(
+    world: &World,
+    entries: &[Verify],
+    points: &Points<D>,
+    load_factor: f64,
+    time: f64,
+) -> Result<BTreeMap<String, f64>> {
+    let mut figures = BTreeMap::new();
+    let total_volume = world.sum(points.volume_initial.iter().sum());
+    for entry in entries {
+        let (field, component) = PointField::parse_selector(&entry.field)?;
+        let (mut sum, mut worst) = (0.0, 0.0f64);
+        let mut values = Vec::new();
+        for p in 0..points.len() {
+            values.clear();
+            field.append(points, p, &mut values);
+            let scope = scope_of(points, p, load_factor, time);
+            let computed: &[f64] = match component {
+                Some(c) => &values[c..=c],
+                None => &values,
+            };
+            let square: f64 = computed
+                .iter()
+                .zip(&entry.exact)
+                .map(|(value, exact)| (value - exact.value(&scope)).powi(2))
+                .sum();
+            let difference = square.sqrt();
+            worst = if difference.is_nan() { f64::NAN } else { worst.max(difference) };
+            sum += points.volume_initial[p]
+                * match entry.norm {
+                    VerifyNorm::VolumeL2 => square,
+                    _ => difference,
+                };
+        }
+        let sum = world.sum(sum);
+        let value = match entry.norm {
+            VerifyNorm::VolumeL1 => sum / (entry.scale * total_volume),
+            VerifyNorm::VolumeL2 => (sum / total_volume).sqrt() / entry.scale,
+            VerifyNorm::Max => world.max(worst) / entry.scale,
+        };
+        figures.insert(entry.name.clone(), value);
+    }
+    Ok(figures)
+}
