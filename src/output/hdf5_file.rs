@@ -70,7 +70,10 @@ impl<'c> ParallelFile<'c> {
     /// Writes a table of `columns` columns (a plain vector for one column): `values` are this
     /// rank's rows, row by row. Returns the number of rows of all ranks.
     pub fn write_rows<T: H5Type>(&self, name: &str, columns: usize, values: &[T]) -> Result<usize> {
-        assert!(columns > 0 && values.len() % columns == 0, "{name}: rows of unequal length");
+        assert!(
+            columns > 0 && values.len().is_multiple_of(columns),
+            "{name}: rows of unequal length"
+        );
         let rows = values.len() / columns;
         let (first, total) = self.place(rows);
         let builder = self.file.new_dataset::<T>();
