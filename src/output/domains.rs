@@ -1,0 +1,81 @@
+//! The sub-domain of each point as a polygon or brick, so that it can be seen.
+//!
+//! | basis | corners |
+//! |---|---|
+//! | `mpm` | none: a point |
+//! | `gimp` | x -/+ l_p along each axis |
+//! | `cpdi1` | x + F r, r the corners of the initial domain about the point |
+//! | `cpdi2` | the corners that the point carries |
+
+use nalgebra::Vector3;
+
+use super::point_field::append_vector;
+use super::xdmf::Topology;
+use crate::deck::model::Basis;
+use crate::points::{Points, rectangle_corners};
+
+/// The shape of one sub-domain in space of `dimension`; `None` for a basis without domains.
+pub fn topology(basis: Basis, dimension: usize) -> Option<Topology> {
+    match (basis, dimension) {
+        (Basis::Mpm, _) => None,
+        (_, 2) => Some(Topology::Quadrilateral),
+        _ => Some(Topology::Hexahedron),
+    }
+}
+
+/// The 2^D corners of point `p`'s domain, counter-clockwise, hex8 order in 3D; the point itself
+/// repeated for `mpm`.
+pub fn corners<const D: usize>(points: &Points<D>, basis: Basis, p: usize) -> [[f64; D]; 8] {
+    let position = points.position[p];
+    match basis {
+        Basis::Mpm => [position; 8],
+        Basis::Gimp => rectangle_corners(position, points.half_length[p]),
+        Basis::Cpdi2 => points.corners[p],
+        Basis::Cpdi1 => {
+            let f = &points.deformation_gradient[p];
+            rectangle_corners([0.0; D], points.half_length_initial[p]).map(|corner| {
+                let r = Vector3::from_fn(|axis, _| corner.get(axis).copied().unwrap_or(0.0));
+                let moved = f * r;
+                std::array::from_fn(|axis| position[axis] + moved[axis])
+            })
+        }
+    }
+}
+
+/// Three columns per corner, 2^D corners per point.
+pub fn corner_rows<const D: usize>(points: &Points<D>, basis: Basis) -> Vec<f64> {
+    let mut rows = Vec::with_capacity(points.len() * (3 << D));
+    for p in 0..points.len() {
+        for corner in corners(points, basis, p).iter().take(1 << D) {
+            append_vector(corner, &mut rows);
+        }
+    }
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+
+    #[test]
+    fn cpdi1_carries_the_rectangle_with_f_and_gimp_does_not() {
+        let mut points = Points::<2>::default();
+        points.push_unstrained(0, 0, [1.0, 1.0], 0.08, 1.0, [0.2, 0.1]);
+        // a quarter turn
+        points.deformation_gradient[0] = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
+        let flat = |basis| corner_rows(&points, basis);
+        let expected = [1.1, 0.8, 0.0, 1.1, 1.2, 0.0, 0.9, 1.2, 0.0, 0.9, 0.8, 0.0];
+        for (value, expected) in flat(Basis::Cpdi1).iter().zip(expected) {
+            approx::assert_relative_eq!(*value, expected, epsilon = 1e-15);
+        }
+        let expected = [0.8, 0.9, 0.0, 1.2, 0.9, 0.0, 1.2, 1.1, 0.0, 0.8, 1.1, 0.0];
+        for (value, expected) in flat(Basis::Gimp).iter().zip(expected) {
+            approx::assert_relative_eq!(*value, expected, epsilon = 1e-15);
+        }
+        assert_eq!(flat(Basis::Cpdi2), flat(Basis::Gimp), "an unmoved CPDI2 domain");
+        assert_eq!(topology(Basis::Mpm, 2), None);
+        assert_eq!(topology(Basis::Cpdi2, 3), Some(Topology::Hexahedron));
+    }
+}

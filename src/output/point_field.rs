@@ -1,0 +1,276 @@
+//! The point fields that can be written or verified: names, shapes and formulas.
+//!
+//! Cauchy stress sigma = tau / J; pressure p = -tr(sigma)/3 (positive in compression);
+//! `von_mises` sqrt(3 J2) of the Cauchy stress; `deviatoric_radius` sqrt(2 J2) of the Kirchhoff
+//! stress, the radius that the von Mises model bounds by its yield value (Lagrangian eq. 43).
+
+use nalgebra::Matrix3;
+
+use crate::error::{Error, Result};
+use crate::points::Points;
+
+/// Shape of a field's value at one point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Whole number, one column of `i64`.
+    Integer,
+    Scalar,
+    /// x, y, z; z is zero in plane strain.
+    Vector,
+    /// 00, 01, 02, 11, 12, 22
+    Tensor6,
+    /// Row by row: 00, 01, 02, 10, ...
+    Tensor9,
+}
+
+impl Quantity {
+    pub fn columns(self) -> usize {
+        match self {
+            Quantity::Integer | Quantity::Scalar => 1,
+            Quantity::Vector => 3,
+            Quantity::Tensor6 => 6,
+            Quantity::Tensor9 => 9,
+        }
+    }
+
+    /// The words after the dot in `stress.yy`, in column order.
+    pub fn component_names(self) -> &'static [&'static str] {
+        match self {
+            Quantity::Integer | Quantity::Scalar => &[],
+            Quantity::Vector => &["x", "y", "z"],
+            Quantity::Tensor6 => &["xx", "xy", "xz", "yy", "yz", "zz"],
+            Quantity::Tensor9 => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
+        }
+    }
+}
+
+macro_rules! point_field_table {
+    ($( $(#[$doc:meta])* $variant:ident, $name:literal, $quantity:ident, $unit:literal; )*) => {
+        /// A field of the material points, named as in `output.fields`.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum PointField { $( $(#[$doc])* $variant, )* }
+
+        impl PointField {
+            pub const ALL: &'static [PointField] = &[$( PointField::$variant ),*];
+
+            pub fn name(self) -> &'static str {
+                match self { $( PointField::$variant => $name ),* }
+            }
+
+            pub fn quantity(self) -> Quantity {
+                match self { $( PointField::$variant => Quantity::$quantity ),* }
+            }
+
+            pub fn unit(self) -> &'static str {
+                match self { $( PointField::$variant => $unit ),* }
+            }
+        }
+    };
+}
+
+point_field_table! {
+    /// u = x - X
+    Displacement, "displacement", Vector, "m";
+    Position, "position", Vector, "m";
+    PositionInitial, "position_initial", Vector, "m";
+    Velocity, "velocity", Vector, "m/s";
+    Acceleration, "acceleration", Vector, "m/s2";
+    /// Cauchy stress
+    Stress, "stress", Tensor6, "Pa";
+    KirchhoffStress, "kirchhoff_stress", Tensor6, "Pa";
+    Pressure, "pressure", Scalar, "Pa";
+    VonMises, "von_mises", Scalar, "Pa";
+    DeviatoricRadius, "deviatoric_radius", Scalar, "Pa";
+    /// Accumulated plastic strain
+    PlasticStrain, "plastic_strain", Scalar, "-";
+    Dissipation, "dissipation", Scalar, "J/m3";
+    DeformationGradient, "deformation_gradient", Tensor9, "-";
+    ElasticLeftCauchyGreen, "elastic_left_cauchy_green", Tensor6, "-";
+    /// det F
+    Jacobian, "J", Scalar, "-";
+    /// Current volume
+    Volume, "volume", Scalar, "m3";
+    Mass, "mass", Scalar, "kg";
+    HalfLength, "half_length", Vector, "m";
+    PointForce, "point_force", Vector, "N";
+    /// Stable identity
+    Id, "id", Integer, "-";
+    /// Index of the deck's body
+    Body, "body", Integer, "-";
+    /// The rank that owns the point
+    Rank, "rank", Integer, "-";
+}
+
+impl PointField {
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.iter().copied().find(|field| field.name() == name)
+    }
+
+    /// The fields of `output.fields`.
+    ///
+    /// # Errors
+    /// `Input` for an unknown name, with the nearest known one.
+    pub fn parse_list(names: &[String]) -> Result<Vec<Self>> {
+        names.iter().map(|name| Self::from_name(name).ok_or_else(|| unknown(name))).collect()
+    }
+
+    /// A field, or one component of it: `stress`, `stress.yy`.
+    pub fn parse_selector(text: &str) -> Result<(Self, Option<usize>)> {
+        let (name, component) = match text.split_once('.') {
+            Some((name, component)) => (name, Some(component)),
+            None => (text, None),
+        };
+        let field = Self::from_name(name).ok_or_else(|| unknown(name))?;
+        let Some(component) = component else { return Ok((field, None)) };
+        let known = field.quantity().component_names();
+        match known.iter().position(|&word| word == component) {
+            Some(index) => Ok((field, Some(index))),
+            None if known.is_empty() => Err(Error::Input(format!(
+                "{name} is one number and has no component `{component}`"
+            ))),
+            None => Err(Error::Input(format!(
+                "{name} has no component `{component}`; it has {}",
+                known.join(", ")
+            ))),
+        }
+    }
+
+    /// Appends the columns of this field at point `p`; integers of [`Quantity::Integer`] fields
+    /// come from [`PointField::integer`] instead and appear here rounded to `f64`.
+    pub fn append<const D: usize>(self, points: &Points<D>, p: usize, out: &mut Vec<f64>) {
+        let jacobian = || points.deformation_gradient[p].determinant();
+        let cauchy = || points.kirchhoff_stress[p] / jacobian();
+        match self {
+            PointField::Displacement => {
+                let (x, start) = (&points.position[p], &points.position_initial[p]);
+                append_vector(&std::array::from_fn::<f64, D, _>(|a| x[a] - start[a]), out);
+            }
+            PointField::Position => append_vector(&points.position[p], out),
+            PointField::PositionInitial => append_vector(&points.position_initial[p], out),
+            PointField::Velocity => append_vector(&points.velocity[p], out),
+            PointField::Acceleration => append_vector(&points.acceleration[p], out),
+            PointField::HalfLength => append_vector(&points.half_length[p], out),
+            PointField::PointForce => append_vector(&points.point_force[p], out),
+            PointField::Stress => append_symmetric(&cauchy(), out),
+            PointField::KirchhoffStress => append_symmetric(&points.kirchhoff_stress[p], out),
+            PointField::ElasticLeftCauchyGreen => {
+                append_symmetric(&points.elastic_left_cauchy_green[p], out);
+            }
+            PointField::Pressure => out.push(-cauchy().trace() / 3.0),
+            PointField::VonMises => out.push(1.5_f64.sqrt() * deviatoric_norm(&cauchy())),
+            PointField::DeviatoricRadius => out.push(deviatoric_norm(&points.kirchhoff_stress[p])),
+            PointField::PlasticStrain => out.push(points.plastic_strain[p]),
+            PointField::Dissipation => out.push(points.dissipation[p]),
+            PointField::DeformationGradient => {
+                let f = &points.deformation_gradient[p];
+                out.extend((0..9).map(|k| f[(k / 3, k % 3)]));
+            }
+            PointField::Jacobian => out.push(jacobian()),
+            PointField::Volume => out.push(points.volume(p)),
+            PointField::Mass => out.push(points.mass[p]),
+            PointField::Id => out.push(points.id[p] as f64),
+            PointField::Body => out.push(f64::from(points.body[p])),
+            PointField::Rank => out.push(0.0),
+        }
+    }
+
+    /// The value of an integer field, `None` for the others.
+    pub fn integer<const D: usize>(self, points: &Points<D>, p: usize, rank: i32) -> Option<i64> {
+        match self {
+            PointField::Id => Some(points.id[p] as i64),
+            PointField::Body => Some(i64::from(points.body[p])),
+            PointField::Rank => Some(i64::from(rank)),
+            _ => None,
+        }
+    }
+}
+
+/// Three columns whatever the dimension: readers take positions and vectors in space only.
+pub fn append_vector<const D: usize>(vector: &[f64; D], out: &mut Vec<f64>) {
+    out.extend((0..3).map(|axis| vector.get(axis).copied().unwrap_or(0.0)));
+}
+
+fn append_symmetric(tensor: &Matrix3<f64>, out: &mut Vec<f64>) {
+    out.extend([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|index| tensor[index]));
+}
+
+/// ||s|| = sqrt(2 J2)
+fn deviatoric_norm(stress: &Matrix3<f64>) -> f64 {
+    (stress - Matrix3::identity() * (stress.trace() / 3.0)).norm()
+}
+
+fn unknown(name: &str) -> Error {
+    let nearest = PointField::ALL
+        .iter()
+        .map(|field| field.name())
+        .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)))
+        .unwrap_or_default();
+    let all: Vec<_> = PointField::ALL.iter().map(|field| field.name()).collect();
+    Error::Input(format!(
+        "unknown point field `{name}`: did you mean `{nearest}`? Known are {}",
+        all.join(", ")
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn values(points: &Points<2>, field: PointField) -> Vec<f64> {
+        let mut out = Vec::new();
+        field.append(points, 0, &mut out);
+        assert_eq!(out.len(), field.quantity().columns(), "{}", field.name());
+        out
+    }
+
+    /// One point stretched by 2 along x and sheared, with a full stress.
+    fn sample() -> Points<2> {
+        let mut points = Points::<2>::default();
+        points.push_unstrained(7, 1, [1.0, 2.0], 0.25, 8.0, [0.25, 0.25]);
+        points.position[0] = [1.5, 1.0];
+        points.deformation_gradient[0] = Matrix3::new(2.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0);
+        points.kirchhoff_stress[0] = Matrix3::new(8.0, 2.0, 0.0, 2.0, 4.0, 0.0, 0.0, 0.0, 6.0);
+        points
+    }
+
+    #[test]
+    fn values_by_hand() {
+        let points = sample();
+        assert_eq!(values(&points, PointField::Displacement), [0.5, -1.0, 0.0]);
+        assert_eq!(values(&points, PointField::Stress), [4.0, 1.0, 0.0, 2.0, 0.0, 3.0]);
+        assert_eq!(values(&points, PointField::Pressure), [-3.0]);
+        // tau: deviator diag(2, -2, 0) and shear 2: s:s = 4 + 4 + 2 * 4 = 16
+        approx::assert_relative_eq!(values(&points, PointField::DeviatoricRadius)[0], 4.0);
+        // sigma = tau / 2: s:s = 4, sqrt(3/2 * 4)
+        approx::assert_relative_eq!(values(&points, PointField::VonMises)[0], 6.0_f64.sqrt());
+        assert_eq!(values(&points, PointField::Jacobian), [2.0]);
+        assert_eq!(values(&points, PointField::Volume), [0.5]);
+        assert_eq!(values(&points, PointField::Mass), [2.0]);
+        let f = values(&points, PointField::DeformationGradient);
+        assert_eq!(f, [2.0, 0.5, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]);
+        assert_eq!(PointField::Id.integer(&points, 0, 3), Some(7));
+        assert_eq!(PointField::Body.integer(&points, 0, 3), Some(1));
+        assert_eq!(PointField::Rank.integer(&points, 0, 3), Some(3));
+        for &field in PointField::ALL {
+            values(&points, field);
+            assert_eq!(PointField::from_name(field.name()), Some(field));
+        }
+    }
+
+    #[test]
+    fn selectors() {
+        let parse = PointField::parse_selector;
+        assert_eq!(parse("stress.yy").unwrap(), (PointField::Stress, Some(3)));
+        assert_eq!(parse("deformation_gradient.zx").unwrap().1, Some(6));
+        assert_eq!(parse("J").unwrap(), (PointField::Jacobian, None));
+        for (text, part) in [
+            ("stess.yy", "did you mean `stress`"),
+            ("stress.y", "it has xx, xy, xz, yy, yz, zz"),
+            ("J.x", "has no component `x`"),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains(part), "{error}");
+        }
+    }
+}

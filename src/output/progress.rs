@@ -1,0 +1,149 @@
+//! One line per step: where the run is, how the solver did, how long it will still take.
+
+use super::log::Log;
+use super::report::{duration, fixed_width};
+
+/// Shortest time between two lines that stay on a terminal, s.
+const LINE_EVERY: f64 = 0.2;
+/// Shortest time between two changes of the line that moves, s.
+const CHANGE_EVERY: f64 = 0.05;
+
+/// A finished step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepReport {
+    pub step: usize,
+    /// Steps of the whole analysis, if it is known.
+    pub steps: Option<usize>,
+    /// Share of the analysis that is done, 0 to 1.
+    pub share: f64,
+    /// s, in dynamics
+    pub time: Option<f64>,
+    /// `None` in explicit dynamics.
+    pub newton: Option<NewtonReport>,
+    /// s since the start of the run.
+    pub elapsed: f64,
+}
+
+/// How the solution of a step went.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct NewtonReport {
+    pub iterations: usize,
+    pub residual: f64,
+    pub linear_iterations: usize,
+    /// Times that this step was halved.
+    pub cuts: usize,
+}
+
+/// Prints the steps: all of them in a file, no more than a reader can follow on a terminal.
+#[derive(Debug, Default)]
+pub struct Progress {
+    started: Option<(f64, f64)>,
+    last_line: Option<f64>,
+    last_change: f64,
+    headed: bool,
+}
+
+impl Progress {
+    /// `share` and `elapsed` (s) of the run at the first step: not zero after a restart.
+    pub fn new(share: f64, elapsed: f64) -> Self {
+        Self { started: Some((share, elapsed)), ..Self::default() }
+    }
+
+    pub fn step(&mut self, log: &mut Log, report: &StepReport) {
+        if !std::mem::replace(&mut self.headed, true) {
+            log.say(&heading(report));
+        }
+        let line = line(report, self.left(report));
+        log.note(&line);
+        let quiet_for = report.elapsed - self.last_line.unwrap_or(f64::NEG_INFINITY);
+        if !log.on_terminal() || quiet_for >= LINE_EVERY || report.share >= 1.0 {
+            log.show(&line);
+            self.last_line = Some(report.elapsed);
+            self.last_change = report.elapsed;
+        } else if report.elapsed - self.last_change >= CHANGE_EVERY {
+            log.show_briefly(&line);
+            self.last_change = report.elapsed;
+        }
+    }
+
+    /// Seconds to go, if the rest is like the part done so far.
+    fn left(&self, report: &StepReport) -> Option<f64> {
+        let (share, elapsed) = self.started.unwrap_or_default();
+        let done = report.share - share;
+        let left = (1.0 - report.share) * (report.elapsed - elapsed) / done;
+        (done > 0.0 && left.is_finite()).then_some(left.max(0.0))
+    }
+}
+
+fn heading(report: &StepReport) -> String {
+    let place = if report.time.is_some() { "   time [s]" } else { "       load" };
+    let solver = if report.newton.is_some() { "  newton   residual  linear" } else { "" };
+    format!("\n{:>13}{place}{solver}   elapsed      left", "step")
+}
+
+fn line(report: &StepReport, left: Option<f64>) -> String {
+    let step = match report.steps {
+        Some(steps) => format!("{}/{steps}", report.step),
+        None => report.step.to_string(),
+    };
+    let place = match report.time {
+        Some(time) => fixed_width(time),
+        None => format!("{:.4}", report.share),
+    };
+    let mut line = format!("{step:>13}{place:>11}");
+    if let Some(newton) = &report.newton {
+        line += &format!(
+            "{:>8}{:>11}{:>8}",
+            newton.iterations,
+            format!("{:.2e}", newton.residual),
+            newton.linear_iterations
+        );
+    }
+    line += &format!("{:>10}{:>10}", duration(report.elapsed), left.map_or("-".into(), duration));
+    match report.newton.map_or(0, |newton| newton.cuts) {
+        0 => {}
+        1 => line += "  (cut once)",
+        cuts => line += &format!("  (cut {cuts} times)"),
+    }
+    line
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_stand_under_the_heading() {
+        let newton =
+            NewtonReport { iterations: 4, residual: 3.21e-10, linear_iterations: 57, cuts: 2 };
+        let report = StepReport {
+            step: 5,
+            steps: Some(50),
+            share: 0.1,
+            time: None,
+            newton: Some(newton),
+            elapsed: 12.0,
+        };
+        let left = Progress::new(0.0, 2.0).left(&report);
+        assert_eq!(left, Some(90.0), "10 s for a tenth");
+        assert_eq!(
+            format!("{}\n{}", heading(&report), line(&report, left)),
+            "\n         step       load  newton   residual  linear   elapsed      left\n         \
+             5/50     0.1000       4   3.21e-10      57    12.0 s     1m30s  (cut 2 times)"
+        );
+        let report = StepReport { time: Some(0.0125), newton: None, steps: None, ..report };
+        assert_eq!(
+            format!("{}\n{}", heading(&report), line(&report, None)),
+            "\n         step   time [s]   elapsed      left\n            5  1.250e-02    12.0 s         -"
+        );
+    }
+
+    #[test]
+    fn a_restart_does_not_count_what_others_did() {
+        let report = StepReport { share: 0.6, elapsed: 30.0, ..Default::default() };
+        // a tenth took 20 s, four are left
+        let left = Progress::new(0.5, 10.0).left(&report).unwrap();
+        approx::assert_relative_eq!(left, 80.0, max_relative = 1e-12);
+        assert_eq!(Progress::new(0.6, 30.0).left(&report), None);
+    }
+}

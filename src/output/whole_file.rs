@@ -1,0 +1,68 @@
+//! Files that are whole or absent: written under another name, then renamed.
+
+use std::ffi::OsString;
+use std::fs::{self, File};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// Ending of a file that is still being written.
+pub const PARTIAL: &str = ".partial";
+
+/// The name a file has until it is whole.
+pub fn partial_path(path: &Path) -> PathBuf {
+    let mut name = OsString::from(path);
+    name.push(PARTIAL);
+    PathBuf::from(name)
+}
+
+/// Replaces `path` by `content`; a reader sees the old file or the new one, never a mixture.
+pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
+    let partial = partial_path(path);
+    let write = || -> std::io::Result<()> {
+        let mut file = File::create(&partial)?;
+        file.write_all(content)?;
+        file.sync_all()?;
+        fs::rename(&partial, path)
+    };
+    write().map_err(|reason| {
+        // A file that could not be finished would only confuse the next reader.
+        let _ = fs::remove_file(&partial);
+        cannot_write(path, &reason)
+    })
+}
+
+pub fn cannot_write(path: &Path, reason: &std::io::Error) -> Error {
+    Error::File(format!("cannot write {}: {reason}", path.display()))
+}
+
+pub fn cannot_read(path: &Path, reason: &std::io::Error) -> Error {
+    Error::File(format!("cannot read {}: {reason}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn replaces_the_old_content_and_leaves_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("summary.json");
+        write_whole(&path, b"old and longer").unwrap();
+        write_whole(&path, b"new").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_missing_folder_is_named_with_the_reason() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("absent").join("summary.json");
+        let error = write_whole(&path, b"x").unwrap_err();
+        assert_eq!(error.exit_code(), 3);
+        let text = error.to_string();
+        assert!(text.contains("absent/summary.json"), "{text}");
+        assert!(text.contains("No such file"), "{text}");
+    }
+}
