@@ -3,7 +3,7 @@
 use crate::assembly::numbering::Touched;
 use crate::assembly::{Numbering, Pattern, Populated, pattern};
 use crate::basis::{self, Groups, Influences};
-use crate::deck::model::{Deck, Ghost};
+use crate::deck::Deck;
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
@@ -38,6 +38,8 @@ pub struct Discretisation<const D: usize> {
     pub node_weight: Vec<f64>,
     /// Local nodes that a Ghost face stabilises.
     pub on_face: Vec<bool>,
+    /// Cells of the faces owned here.
+    pub ghost_cells: Vec<usize>,
 }
 
 impl<const D: usize> Discretisation<D> {
@@ -48,11 +50,12 @@ impl<const D: usize> Discretisation<D> {
         let influences = world.fail_together(basis::map_points(grid, basis, points))?;
         let groups = Groups::new(&influences);
         let populated = Populated::find(world, grid, partition, basis, points)?;
-        let faces = find_faces(world, model, model.deck.ghost.as_ref(), &populated)?;
+        let (faces, ghost_cells) = find_faces(world, model, &populated)?;
 
         let mut reached = groups.nodes.clone();
         reached.extend(faces.iter().flat_map(|face| face.nodes.iter().copied()));
-        for &cell in &populated.reached {
+        let owned_cells = populated.owned.iter().map(|(cell, _)| cell);
+        for &cell in populated.reached.iter().chain(owned_cells) {
             grid.cell_nodes(cell, &mut reached);
         }
         let touched = Touched::settle(world, grid, partition, reached)?;
@@ -85,17 +88,31 @@ impl<const D: usize> Discretisation<D> {
             pattern,
             node_weight,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
+            ghost_cells,
         })
+    }
+
+    /// Local nodes that carry no equation of their own: their summed weight is at most
+    /// `threshold` times the largest one, and no Ghost face holds them. Collective.
+    pub fn nodes_left_out(&self, world: &World, threshold: f64) -> Vec<bool> {
+        let largest = world.max(self.node_weight.iter().copied().fold(0.0, f64::max));
+        self.node_weight
+            .iter()
+            .zip(&self.on_face)
+            .map(|(&weight, &on_face)| !on_face && weight <= threshold * largest)
+            .collect()
     }
 }
 
+/// The Ghost faces owned here and the cells beside them.
 fn find_faces<const D: usize>(
     world: &World,
     model: &Model<D>,
-    ghost: Option<&Ghost>,
     populated: &Populated,
-) -> Result<Vec<FaceStencil>> {
-    let Some(ghost) = ghost else { return Ok(Vec::new()) };
+) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
+    let Some(ghost) = &model.deck.ghost else { return Ok((Vec::new(), Vec::new())) };
     let faces = boundary_faces(world, &model.grid, &model.partition, &populated.owned)?;
-    world.fail_together(face_stencils(&model.grid, &faces, ghost.scaling, &model.penalties))
+    let cells = faces.iter().flat_map(|face| [face.pair.lower, face.pair.upper]).collect();
+    let stencils = face_stencils(&model.grid, &faces, ghost.scaling, &model.penalties);
+    Ok((world.fail_together(stencils)?, cells))
 }

@@ -4,6 +4,8 @@
 //! zero in each step, and the error is |f_ext - f_int + f_react| / |f_ext + f_react| over all
 //! degrees of freedom (Lagrangian eq. 40). Iteration 0 evaluates at zero displacement.
 
+use std::time::Instant;
+
 use crate::assembly::conditions::Conditions;
 use crate::assembly::internal::{self, Health, StepPoints};
 use crate::assembly::{BlockMatrix, Numbering, Pattern};
@@ -12,6 +14,7 @@ use crate::error::Result;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::{NewtonProblem, Verdict};
+use crate::points::Points;
 
 use super::discretise::Discretisation;
 
@@ -46,12 +49,15 @@ pub struct Equilibrium<'a, const D: usize> {
     previous_owned: Vec<f64>,
     internal_owned: Vec<f64>,
     internal_previous: Vec<f64>,
+    internal_start: Vec<f64>,
     reaction_owned: Vec<f64>,
     diagonal_scale: f64,
     /// Normalised error of each evaluation that was accepted.
     pub errors: Vec<f64>,
     /// Health of the last evaluation on this rank.
     pub health: Health,
+    /// Wall time of all evaluations, s.
+    pub assembly_seconds: f64,
 }
 
 #[derive(Default)]
@@ -101,6 +107,8 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             previous_owned: vec![0.0; owned],
             internal_owned: vec![0.0; owned],
             internal_previous: vec![0.0; owned],
+            internal_start: Vec::new(),
+            assembly_seconds: 0.0,
             reaction_owned: vec![0.0; owned],
             diagonal_scale: 0.0,
             errors: Vec::new(),
@@ -118,8 +126,23 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         &self.internal_owned
     }
 
-    pub fn external_force(&self) -> &[f64] {
-        &self.external_owned
+    /// The same at zero displacement.
+    pub fn internal_force_at_start(&self) -> &[f64] {
+        &self.internal_start
+    }
+
+    /// The point that made the last evaluation unusable, if this rank has one.
+    pub fn refused_point(&self, points: &Points<D>) -> Option<String> {
+        let name = |p: usize| format!("point {} at {:?}", points.id[p], points.position[p]);
+        match (self.health.not_finite, self.health.inverted, self.settings.inverted) {
+            (Some(p), _, _) => Some(format!("{} has a stress that is not finite", name(p))),
+            (None, Some(p), InvertedIterates::Reject) => Some(format!(
+                "{} is turned inside out; smaller steps, Ghost stiffness or \
+                 analysis.inverted_iterates = \"allow\" may help",
+                name(p)
+            )),
+            _ => None,
+        }
     }
 
     /// Energy of the Ghost term, u K_G u / 2, this rank's share, J.
@@ -267,8 +290,11 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
 
 impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+        let begin = Instant::now();
         self.load_displacement(x)?;
-        if !self.evaluate()? {
+        let usable = self.evaluate()?;
+        self.assembly_seconds += begin.elapsed().as_secs_f64();
+        if !usable {
             return Ok(false);
         }
         if self.diagonal_scale == 0.0 {
@@ -326,6 +352,8 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     fn assess(&mut self, iteration: usize, x: &[f64], _f: &[f64]) -> Result<Verdict> {
         if iteration > 0 {
             self.accumulate_reactions(x)?;
+        } else {
+            self.internal_start.clone_from(&self.internal_owned);
         }
         let error = self.normalised_error();
         self.errors.push(error);

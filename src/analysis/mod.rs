@@ -3,11 +3,27 @@
 //! | deck value or step | file | source |
 //! |---|---|---|
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
-//! | grid side of a step: map, number | `discretise.rs` | Ghost Figure 1 a-c |
-//! | Newton iterations with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
-//! | points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
+//! | deck to points on their ranks | `setup.rs` | |
+//! | map and number: the grid side of a step | `discretise.rs` | Ghost Figure 1 a-c |
+//! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
+//! | default linear solvers | `solver.rs` | |
+//! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
+//! | cut and grow load steps | `stepping.rs` | |
+//! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
+//! | a run from command line to results | `driver.rs`, `plan.rs` | |
+//! | rows, frames, summary | `recorder.rs`, `clock.rs` | |
 
+pub mod clock;
 pub mod discretise;
+pub mod driver;
 pub mod equilibrium;
+pub mod plan;
+pub mod quasi_static;
+pub mod reactions;
+pub mod recorder;
+pub mod setup;
+pub mod solver;
+pub mod stepping;
 pub mod update;
+pub mod verify;

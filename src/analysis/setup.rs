@@ -120,17 +120,3 @@ fn place_point_forces<const D: usize>(
     }
     Ok(())
 }
-
-/// Memory that the plan expects, bytes: points with influences, and matrix entries.
-pub fn estimated_memory<const D: usize>(deck: &Deck, points: usize, cells: usize) -> usize {
-    let nodes_each = match (deck.method.basis, D) {
-        (model::Basis::Mpm, _) => 1 << D,
-        (model::Basis::Gimp, 2) => 7,
-        (model::Basis::Gimp, _) => 18,
-        _ => 4 << D,
-    };
-    let row: usize = if D == 2 { 25 } else { 80 };
-    let per_point = 8 * Points::<D>::record_words() + nodes_each * (16 + 8 * D);
-    let per_node = row * (8 * D * D * 3 + 8);
-    points * per_point + cells * per_node
-}

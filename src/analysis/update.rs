@@ -13,7 +13,7 @@ use crate::material::Material;
 use crate::mechanics::{self, StepStart};
 use crate::parallel::World;
 use crate::points::Points;
-use crate::tensor;
+use crate::tensor::{self, Spectrum};
 
 /// Increments at each point of this rank, computed but not yet applied.
 pub struct Increments<const D: usize> {
@@ -74,7 +74,7 @@ pub fn reason_to_refuse<const D: usize>(
     for p in 0..points.len() {
         let x = points.position[p];
         let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
-        let determinant = tensor::determinant(&increments.deformation[p]);
+        let determinant = tensor::dense::determinant(&increments.deformation[p]);
         let what = if !determinant.is_finite() || moved.iter().any(|m| !m.is_finite()) {
             "has a displacement that is not finite".to_string()
         } else if determinant <= 0.0 {
@@ -98,7 +98,6 @@ pub fn apply<const D: usize>(
     basis: Basis,
     rule: DomainUpdate,
     numbering: &Numbering,
-    influences: &crate::basis::Influences<D>,
     displacement: &[f64],
     increments: &Increments<D>,
     points: &mut Points<D>,
@@ -126,9 +125,9 @@ pub fn apply<const D: usize>(
         points.dissipation[p] += state.dissipation;
         whole.push(step);
     }
-    let _ = basis;
-    update_domains(grid, rule, points, influences, &whole, &|node| {
-        numbering.local(node).map(|local| std::array::from_fn(|i| displacement[local * D + i]))
+    update_domains(grid, basis, rule, points, &whole, &|node| match numbering.local(node) {
+        Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
+        None => [0.0; D],
     })?;
     for (x, moved) in points.position.iter_mut().zip(&increments.displacement) {
         for (x, m) in x.iter_mut().zip(moved) {
@@ -143,7 +142,7 @@ pub fn energies<const D: usize>(points: &Points<D>, materials: &[Material]) -> P
     let mut sum = PointEnergies::default();
     for p in 0..points.len() {
         let elasticity = materials[points.body[p] as usize].elasticity();
-        let strain = tensor::principal_log_strain(&points.elastic_left_cauchy_green[p]);
+        let strain = Spectrum::of(&points.elastic_left_cauchy_green[p]).values.map(|b| 0.5 * b.ln());
         sum.strain += elasticity.energy(strain) * points.volume_initial[p];
         sum.plastic += points.dissipation[p] * points.volume_initial[p];
         let speed: f64 = points.velocity[p].iter().map(|v| v * v).sum();

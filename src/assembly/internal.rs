@@ -152,7 +152,7 @@ fn add_point<const D: usize>(
         volume_initial: points.volume_initial[p],
     };
     let (contribution, state) = mechanics::contribution(frame, &start, &increment);
-    if crate::tensor::determinant(&increment) <= 0.0 {
+    if crate::tensor::dense::determinant(&increment) <= 0.0 {
         health.inverted.get_or_insert(p);
     }
     if !state.kirchhoff_stress.iter().all(|t| t.is_finite()) {

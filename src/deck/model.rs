@@ -232,6 +232,15 @@ pub enum MaterialModel {
     VonMises { young: f64, poisson: f64, yield_stress: f64 },
 }
 
+impl MaterialModel {
+    /// Young's modulus, Pa.
+    pub fn young(&self) -> f64 {
+        match *self {
+            MaterialModel::Hencky { young, .. } | MaterialModel::VonMises { young, .. } => young,
+        }
+    }
+}
+
 #[derive(Debug, Clone)]
 pub struct Body {
     pub name: String,

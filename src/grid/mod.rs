@@ -16,6 +16,8 @@ pub mod quadrature;
 pub use face::FaceJump;
 pub use lattice::Lattice;
 
+use crate::error::{Error, Result};
+
 /// Either grid, dispatched per call; both answer the same questions.
 #[derive(Debug, Clone)]
 pub enum Grid<const D: usize> {
@@ -46,6 +48,32 @@ impl<const D: usize> Grid<D> {
     pub fn node_position(&self, node: usize) -> [f64; D] {
         match self {
             Grid::Lattice(lattice) => lattice.node_position(node),
+        }
+    }
+
+    /// Coordinates of a node at the start of the run, m.
+    pub fn node_start(&self, node: usize) -> [f64; D] {
+        match self {
+            Grid::Lattice(lattice) => lattice.node_position(node),
+        }
+    }
+
+    /// Whether a node lies on a side of the lattice; no node of a mesh does.
+    pub fn on_side(&self, node: usize, axis: usize, upper: bool) -> bool {
+        match self {
+            Grid::Lattice(lattice) => {
+                let index = lattice.node_index(node)[axis];
+                index == if upper { lattice.cells[axis] } else { 0 }
+            }
+        }
+    }
+
+    /// Nodes of a mesh tag, ascending. Error: no such tag, or a lattice.
+    pub fn tagged_nodes(&self, tag: &str) -> Result<Vec<usize>> {
+        match self {
+            Grid::Lattice(_) => Err(Error::Input(format!(
+                "boundary tag \"{tag}\": a lattice has no tags; use side or box"
+            ))),
         }
     }
 

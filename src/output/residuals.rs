@@ -28,7 +28,7 @@ impl Residuals {
         Ok(Self { table: CsvTable::resume(&path, &header(), last_step, comm)? })
     }
 
-    /// Appends the residuals of one step; the first belongs to iteration 1. A step that failed
+    /// Appends the residuals of one step; the first belongs to iteration 0, at zero displacement. A step that failed
     /// and is tried again writes its iterations again.
     pub fn push_step(
         &mut self,
@@ -39,7 +39,7 @@ impl Residuals {
         let rows: Vec<[f64; 3]> = residuals
             .iter()
             .enumerate()
-            .map(|(index, &residual)| [step as f64, (index + 1) as f64, residual])
+            .map(|(index, &residual)| [step as f64, index as f64, residual])
             .collect();
         let rows: Vec<&[f64]> = rows.iter().map(|row| &row[..]).collect();
         self.table.push_all(&rows, comm)

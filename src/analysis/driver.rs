@@ -1,0 +1,176 @@
+//! From the command line to a finished results directory: what happens on every rank.
+
+use std::collections::BTreeMap;
+
+use mpi::environment::Universe;
+use mpi::traits::*;
+
+use crate::cli::Arguments;
+use crate::deck::model::AnalysisType;
+use crate::deck::{self, Deck};
+use crate::error::{Error, Result};
+use crate::output::log::Log;
+use crate::output::report::{self, Banner, Failure};
+use crate::output::summary::Status;
+use crate::output::ResultsDirectory;
+use crate::parallel::World;
+use crate::petsc::log::Stages;
+use crate::petsc::session::{self, Session};
+
+use super::clock::Clock;
+use super::quasi_static;
+use super::recorder::{Ending, Recorder};
+use super::{plan, setup};
+
+/// Runs the program after its command line was read; the exit code is the same on all ranks.
+pub fn run(arguments: &Arguments) -> i32 {
+    let Some((universe, _)) =
+        mpi::initialize_with_threading(mpi::Threading::Funneled)
+    else {
+        eprintln!("error: MPI could not be started");
+        return Error::Environment(String::new()).exit_code();
+    };
+    let world = World::new(universe.world().duplicate());
+    match with_world(&universe, &world, arguments) {
+        Ok(()) => 0,
+        Err(error) => {
+            if world.is_root() {
+                eprintln!("{}", error.to_string().trim_end());
+            }
+            error.exit_code()
+        }
+    }
+}
+
+/// Errors that reach this level are the same on every rank.
+fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Result<()> {
+    let text = read_deck_text(world, arguments)?;
+    let deck = world.fail_together(deck::read(&arguments.input, &text, &arguments.sets))?;
+    let session = Session::start(universe, &deck.petsc, &arguments.petsc)?;
+    let mut log = Log::new(world.comm());
+    let versions = versions();
+    log.say(&report::banner(&Banner {
+        version: env!("CARGO_PKG_VERSION").into(),
+        ranks: world.size(),
+        libraries: versions.clone().into_iter().collect(),
+    }));
+    let run = Run { world, session: &session, arguments, text, versions, log };
+    match deck.dimension {
+        2 => run.in_space::<2>(deck),
+        _ => run.in_space::<3>(deck),
+    }
+}
+
+/// Rank 0 reads; the others hear.
+fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
+    let path = &arguments.input;
+    let read = if world.is_root() {
+        std::fs::read(path).map_err(|reason| {
+            Error::Input(format!("error: cannot read the deck {}: {reason}", path.display()))
+        })
+    } else {
+        Ok(Vec::new())
+    };
+    let mut bytes = world.fail_together(read)?;
+    world.broadcast_bytes(0, &mut bytes);
+    String::from_utf8(bytes)
+        .map_err(|_| Error::Input(format!("error: {} is not UTF-8 text", path.display())))
+}
+
+fn versions() -> BTreeMap<String, String> {
+    let mpi = mpi::environment::library_version().unwrap_or_default();
+    let mpi = mpi.split(',').next().unwrap_or_default().trim().to_string();
+    BTreeMap::from([
+        ("mpm-par".to_string(), env!("CARGO_PKG_VERSION").to_string()),
+        ("PETSc".to_string(), session::version()),
+        ("MPI".to_string(), mpi),
+        ("HDF5".to_string(), {
+            let (major, minor, patch) = hdf5::library_version();
+            format!("{major}.{minor}.{patch}")
+        }),
+    ])
+}
+
+/// What a run knows before its dimension.
+struct Run<'a> {
+    world: &'a World,
+    session: &'a Session<'a>,
+    arguments: &'a Arguments,
+    text: String,
+    versions: BTreeMap<String, String>,
+    log: Log,
+}
+
+impl Run<'_> {
+    fn in_space<const D: usize>(mut self, deck: Deck) -> Result<()> {
+        let world = self.world;
+        let mut clock = Clock::new(Some(Stages::register()?));
+        let resolved = deck::resolved(&deck);
+        let (mut model, mut points) = setup::prepare::<D>(world, deck)?;
+        self.log.say(&report::plan(&plan::of(world, &model, &points)?));
+        if self.arguments.check {
+            self.log.say("The deck is good; nothing was run (--check).");
+            return Ok(());
+        }
+        let directory =
+            ResultsDirectory::create(&self.arguments.out, self.arguments.force, world.comm())?;
+        directory.write_decks(&self.text, &resolved, world.comm())?;
+        self.log.attach(&directory, false, world.comm())?;
+        let conditioning = model.deck.analysis.kind == AnalysisType::Conditioning;
+        let mut recorder = Recorder::create(
+            world,
+            &model.deck,
+            directory,
+            self.log,
+            self.versions,
+            conditioning,
+        )?;
+        clock.end_setup();
+
+        let outcome = match model.deck.analysis.kind {
+            AnalysisType::QuasiStatic => {
+                quasi_static::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            other => Err(Error::Input(format!("analysis type {other:?} is not available yet"))),
+        };
+        let ending = match outcome {
+            Ok(ending) => ending,
+            Err(error) => Ending { status: Status::Failed, reason: error.to_string() },
+        };
+        let figures = quasi_static::figures(world, &model, &points, &recorder)?;
+        let summary =
+            recorder.finish(world, &model.deck, &points, &clock, figures, &ending)?;
+        recorder.log.say(&report::closing(&summary, &recorder.directory()));
+        let unused = self.session.unused_options()?;
+        if !unused.is_empty() {
+            recorder.log.say(&format!(
+                "warning: PETSc options that nothing used: {}",
+                unused.join(", ")
+            ));
+        }
+        if ending.status == Status::Completed {
+            return Ok(());
+        }
+        let failure = Failure {
+            what: ending.reason.clone(),
+            last_good_step: Some(recorder.steps_completed),
+            results: Some(recorder.directory()),
+            advice: advice(&model.deck),
+            ..Failure::default()
+        };
+        Err(Error::Run(report::failure(&failure)))
+    }
+}
+
+/// What usually helps when a step cannot be solved, given what the deck does not yet use.
+fn advice(deck: &Deck) -> Vec<String> {
+    let mut advice = Vec::new();
+    if deck.ghost.as_ref().is_none_or(|g| g.stiffness.is_none() && g.stiffness_factor.is_none()) {
+        advice.push("stabilise small overlaps: [ghost] stiffness_factor = 1.0".to_string());
+    }
+    if deck.analysis.on_failure == crate::deck::model::OnFailure::Stop {
+        advice.push("let steps be cut: analysis.on_failure = \"cut\"".to_string());
+    }
+    advice.push("more, smaller steps: analysis.steps".to_string());
+    advice
+}

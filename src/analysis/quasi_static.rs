@@ -1,0 +1,300 @@
+//! Implicit quasi-static analysis (Lagrangian §6.3-6.5, Ghost §2.4): locate, map, number,
+//! {assemble, solve}*, update, migrate, write.
+
+use crate::assembly::Numbering;
+use crate::assembly::conditions::{Conditions, StepSpan};
+use crate::assembly::external::{map_forces, point_forces};
+use crate::assembly::internal::StepPoints;
+use crate::deck::model::AnalysisType;
+use crate::error::{Error, Result};
+use crate::output::history::HistoryRow;
+use crate::output::summary::Status;
+use crate::parallel::{World, migrate};
+use crate::petsc::log::Phase;
+use crate::points::Points;
+
+use super::clock::Clock;
+use super::discretise::{Discretisation, Model};
+use super::equilibrium::{Equilibrium, NewtonSettings};
+use super::reactions::reactions;
+use super::recorder::{Ending, Recorder};
+use super::stepping::Stepping;
+use super::{solver, update, verify};
+
+/// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
+/// the run as `on_failure` says; what was written before stays.
+pub fn run<const D: usize>(
+    world: &World,
+    model: &mut Model<D>,
+    points: &mut Points<D>,
+    recorder: &mut Recorder,
+    clock: &mut Clock,
+) -> Result<Ending> {
+    let analysis = &model.deck.analysis;
+    let steps = analysis.steps.unwrap_or(1);
+    let mut stepping = Stepping::new(steps, 0.0, analysis.on_failure, analysis.smallest_step);
+    let mut totals = Totals::default();
+    recorder.frame(world, 0, 0.0, points)?;
+    while let Some(span) = stepping.next_span() {
+        let number = stepping.step_number();
+        match solve_step(world, model, points, recorder, clock, span, number)? {
+            Ok(solved) => {
+                clock.time(Phase::Migrate, || {
+                    migrate(world, &model.partition, &model.grid, points).map(drop)
+                })?;
+                let ended = stepping.accept();
+                recorder.steps_completed = stepping.completed();
+                let mut row = solved.row;
+                totals.work += row.work_external;
+                totals.ghost += row.energy_ghost;
+                (row.work_external, row.energy_ghost) = (totals.work, totals.ghost);
+                row.cuts = stepping.cuts;
+                row.wall_seconds = clock.elapsed();
+                clock.time(Phase::Output, || {
+                    recorder.step(world, &row, true)?;
+                    let last = stepping.next_span().is_none();
+                    if ended && recorder.wants_frame(number, span.factor_end, last) {
+                        recorder.frame(world, number, span.factor_end, points)?;
+                        recorder.grid_frame(
+                            world,
+                            model,
+                            &solved.mesh,
+                            number,
+                            span.factor_end,
+                            &solved.displacement,
+                            &solved.reaction,
+                        )?;
+                    }
+                    Ok(())
+                })?;
+            }
+            Err(why) => {
+                recorder.log.say(&format!("step {number} refused: {why}"));
+                if !stepping.refuse() {
+                    let status = Status::Stopped;
+                    let reason = format!(
+                        "step {number} of {steps} could not be solved: {why}; the last finished \
+                         step is {}",
+                        stepping.completed()
+                    );
+                    return Ok(Ending { status, reason });
+                }
+            }
+        }
+    }
+    Ok(Ending { status: Status::Completed, reason: String::new() })
+}
+
+/// Sums over the run so far.
+#[derive(Default)]
+struct Totals {
+    work: f64,
+    ghost: f64,
+}
+
+/// A finished step: its row, and the grid as it was solved.
+struct Solved<const D: usize> {
+    row: HistoryRow,
+    mesh: Discretisation<D>,
+    displacement: Vec<f64>,
+    reaction: Vec<f64>,
+}
+
+/// One load step from `span.factor_start` to `factor_end`. The inner `Err` says why the step is
+/// refused; points are then as they were.
+fn solve_step<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &mut Points<D>,
+    recorder: &mut Recorder,
+    clock: &mut Clock,
+    span: StepSpan,
+    number: usize,
+) -> Result<std::result::Result<Solved<D>, String>> {
+    let deck = &model.deck;
+    let (mesh, conditions) = clock.time(Phase::Locate, || {
+        let mesh = Discretisation::new(world, model, points)?;
+        let conditions = Conditions::evaluate(
+            world,
+            &model.grid,
+            deck.method.basis,
+            &mesh.numbering,
+            points,
+            &deck.boundaries,
+            span,
+        )?;
+        Ok((mesh, conditions))
+    })?;
+    let numbering = &mesh.numbering;
+    let external = |factor: f64, time: f64| -> Result<Vec<f64>> {
+        let forces = point_forces(points, &deck.loads, AnalysisType::QuasiStatic, factor, time);
+        owned_forces(world, numbering, &mesh, &forces)
+    };
+    let external_start = external(span.factor_start, span.time_start)?;
+    let external_end = external(span.factor_end, span.time_end)?;
+    let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
+    let step = StepPoints {
+        points,
+        materials: &model.materials,
+        influences: &mesh.influences,
+        groups: &mesh.groups,
+        group_nodes: &mesh.group_nodes,
+    };
+    let settings = NewtonSettings {
+        tolerance: deck.analysis.tolerance,
+        max_evaluations: deck.analysis.max_iterations,
+        frame: deck.method.frame,
+        inverted: deck.analysis.inverted_iterates,
+    };
+    let mut problem = Equilibrium::new(
+        world,
+        &mesh,
+        step,
+        &conditions,
+        &left_out,
+        external_end.clone(),
+        settings,
+    )?;
+    let mut snes = solver::newton::<D>(world, numbering.total * D, settings.max_evaluations)?;
+    let mut matrix = clock.time(Phase::Assemble, || {
+        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
+        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
+    })?;
+    let mut solution = matrix.vector()?;
+    let before = clock.elapsed();
+    let outcome = snes.solve(&mut problem, &mut matrix, &mut solution)?;
+    let assembled = problem.assembly_seconds;
+    clock.add(Phase::Assemble, assembled);
+    clock.add(Phase::Solve, clock.elapsed() - before - assembled);
+
+    recorder.iterations(world, number, &problem.errors)?;
+    if !outcome.converged {
+        let point = problem.refused_point(points);
+        let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
+        return Ok(Err(format!("Newton's method failed ({}){detail}", outcome.reason)));
+    }
+    recorder.newton.add(problem.errors.len());
+    recorder.linear.add(outcome.linear_iterations_total);
+
+    let displacement = problem.displacement().to_vec();
+    let internal = problem.internal_force().to_vec();
+    let internal_start = problem.internal_force_at_start().to_vec();
+    let energy_ghost = world.sum(problem.ghost_energy());
+    let residual = problem.errors.last().copied().unwrap_or(0.0);
+    let evaluations = problem.errors.len();
+    drop(problem);
+
+    let made = update::increments(step, &displacement);
+    if let Some(why) = update::reason_to_refuse(world, &model.grid, points, &made, true) {
+        return Ok(Err(why));
+    }
+    let work = work_of_step::<D>(
+        &conditions,
+        numbering,
+        &displacement,
+        [&external_start, &external_end],
+        [&internal_start, &internal],
+    );
+    clock.time(Phase::Update, || {
+        let updated = update::apply(
+            &model.grid,
+            &model.materials,
+            deck.method.basis,
+            deck.method.domain_update,
+            numbering,
+            &displacement,
+            &made,
+            points,
+        );
+        world.fail_together(updated)
+    })?;
+    let energies = update::energies(points, &model.materials);
+    let sums = world.sum_slice(&[energies.strain, energies.plastic, work]);
+    let reaction: Vec<f64> = (0..numbering.owned * D)
+        .map(|dof| {
+            if conditions.fixed[dof] { internal[dof] - external_end[dof] } else { 0.0 }
+        })
+        .collect();
+    let row = HistoryRow {
+        step: number,
+        load_factor: span.factor_end,
+        time: span.time_end,
+        dt: span.time_end - span.time_start,
+        newton_iterations: evaluations,
+        residual,
+        linear_iterations: outcome.linear_iterations_total,
+        energy_strain: sums[0],
+        energy_plastic: sums[1],
+        energy_ghost,
+        work_external: sums[2],
+        reactions: reactions(
+            world,
+            &model.grid,
+            numbering,
+            &deck.boundaries,
+            &conditions,
+            &internal,
+            &external_end,
+        ),
+        ghost_faces: world.sum_usize(mesh.faces.len()),
+        populated_cells: world.sum_usize(mesh.populated.owned.len()),
+        imbalance: imbalance(world, points.len()),
+        ..HistoryRow::default()
+    };
+    Ok(Ok(Solved { row, mesh, displacement, reaction }))
+}
+
+/// Nodal external force of the owned degrees of freedom. Collective.
+fn owned_forces<const D: usize>(
+    world: &World,
+    numbering: &Numbering,
+    mesh: &Discretisation<D>,
+    forces: &[[f64; D]],
+) -> Result<Vec<f64>> {
+    let mut nodal = map_forces(numbering, &mesh.influences, forces);
+    numbering.halo.reverse_add(world, &mut nodal, D)?;
+    nodal.truncate(numbering.owned * D);
+    Ok(nodal)
+}
+
+/// Work of loads and moved boundaries over the step, by the trapezoidal rule, this rank's share.
+fn work_of_step<const D: usize>(
+    conditions: &Conditions,
+    numbering: &Numbering,
+    displacement: &[f64],
+    external: [&[f64]; 2],
+    internal: [&[f64]; 2],
+) -> f64 {
+    (0..numbering.owned * D)
+        .map(|dof| {
+            // On a held component the boundary supplies what the loads do not.
+            let side = if conditions.fixed[dof] { internal } else { external };
+            0.5 * (side[0][dof] + side[1][dof]) * displacement[dof]
+        })
+        .sum()
+}
+
+/// Largest over mean number of points per rank.
+pub fn imbalance(world: &World, points: usize) -> f64 {
+    let total = world.sum_usize(points);
+    let largest = world.max_usize(points);
+    if total == 0 { 1.0 } else { largest as f64 * world.size() as f64 / total as f64 }
+}
+
+/// Figures of merit at the end of the run. Collective.
+pub fn figures<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    recorder: &Recorder,
+) -> Result<std::collections::BTreeMap<String, f64>> {
+    let steps = model.deck.analysis.steps.unwrap_or(1);
+    let factor = recorder.steps_completed as f64 / steps as f64;
+    let time = model.deck.analysis.duration.unwrap_or(0.0) * factor;
+    verify::figures(world, &model.deck.verify, points, factor, time)
+}
+
+/// A run that failed, as the error the command line reports.
+pub fn as_error(ending: &Ending) -> Option<Error> {
+    (!matches!(ending.status, Status::Completed)).then(|| Error::Run(ending.reason.clone()))
+}
