@@ -1,0 +1,144 @@
+//! Fixed exchange of nodal values between owners and the ranks that hold copies (ghosts).
+
+use mpi::traits::*;
+
+use crate::error::{Error, Result};
+
+use super::{World, exchange};
+
+/// Who sends which values to whom. Local arrays hold the owned values first, then the ghosts in
+/// the order they were asked for (grouped by owner).
+#[derive(Debug, Clone, Default)]
+pub struct HaloPlan {
+    owned: usize,
+    /// (rank, local indices of owned values that it copies), ascending ranks.
+    copies: Vec<(usize, Vec<u32>)>,
+    /// (rank, range of ghosts it owns), ascending ranks.
+    ghosts: Vec<(usize, std::ops::Range<usize>)>,
+}
+
+impl HaloPlan {
+    /// Plans for `ghosts`, pairs (owner, key) in ascending order; `local_of` finds an owned key.
+    /// Collective.
+    pub fn build(
+        world: &World,
+        owned: usize,
+        ghosts: &[(usize, usize)],
+        local_of: impl Fn(usize) -> Option<usize>,
+    ) -> Result<Self> {
+        let mut plan = HaloPlan { owned, ..HaloPlan::default() };
+        let mut requests: Vec<(usize, Vec<u64>)> = Vec::new();
+        for (g, &(owner, key)) in ghosts.iter().enumerate() {
+            if requests.last().is_none_or(|(rank, _)| *rank != owner) {
+                requests.push((owner, Vec::new()));
+                plan.ghosts.push((owner, owned + g..owned + g));
+            }
+            requests.last_mut().expect("pushed above").1.push(key as u64);
+            plan.ghosts.last_mut().expect("pushed above").1.end = owned + g + 1;
+        }
+        let mut missing = None;
+        for (rank, keys) in exchange(world, requests)? {
+            let mut locals = Vec::with_capacity(keys.len());
+            for key in keys {
+                match local_of(key as usize) {
+                    Some(local) => locals.push(local as u32),
+                    None => missing = Some(key),
+                }
+            }
+            plan.copies.push((rank, locals));
+        }
+        world.fail_together(match missing {
+            None => Ok(plan),
+            Some(key) => Err(Error::Run(format!(
+                "rank {} was asked for the value of node {key}, which it does not hold",
+                world.rank()
+            ))),
+        })
+    }
+
+    /// Overwrites the ghosts with their owners' values; `block` values per entry. Collective
+    /// over neighbours.
+    pub fn forward(&self, world: &World, values: &mut [f64], block: usize) -> Result<()> {
+        let (owned, ghosts) = values.split_at_mut(self.owned * block);
+        let packed: Vec<(usize, Vec<f64>)> = self
+            .copies
+            .iter()
+            .map(|(rank, locals)| (*rank, gather(owned, locals, block)))
+            .collect();
+        let mut slots = Vec::with_capacity(self.ghosts.len());
+        let mut rest = ghosts;
+        for (rank, range) in &self.ghosts {
+            let (slot, tail) = rest.split_at_mut(range.len() * block);
+            slots.push((*rank, slot));
+            rest = tail;
+        }
+        swap(world, &packed, slots);
+        Ok(())
+    }
+
+    /// Adds the ghosts' values to their owners, neighbour by neighbour in ascending order of
+    /// rank, so that sums repeat bit by bit. The ghosts keep their values.
+    pub fn reverse_add(&self, world: &World, values: &mut [f64], block: usize) -> Result<()> {
+        let packed: Vec<(usize, Vec<f64>)> = self
+            .ghosts
+            .iter()
+            .map(|(rank, range)| {
+                (*rank, values[range.start * block..range.end * block].to_vec())
+            })
+            .collect();
+        let mut received: Vec<Vec<f64>> =
+            self.copies.iter().map(|(_, locals)| vec![0.0; locals.len() * block]).collect();
+        let slots = self
+            .copies
+            .iter()
+            .zip(&mut received)
+            .map(|((rank, _), buffer)| (*rank, &mut buffer[..]))
+            .collect();
+        swap(world, &packed, slots);
+        for ((_, locals), buffer) in self.copies.iter().zip(&received) {
+            for (&local, block_values) in locals.iter().zip(buffer.chunks_exact(block)) {
+                let start = local as usize * block;
+                for (value, add) in values[start..start + block].iter_mut().zip(block_values) {
+                    *value += add;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Neighbour ranks this one sends owned values to.
+    pub fn neighbours(&self) -> usize {
+        self.copies.len()
+    }
+}
+
+fn gather(values: &[f64], locals: &[u32], block: usize) -> Vec<f64> {
+    let mut packed = Vec::with_capacity(locals.len() * block);
+    for &local in locals {
+        let start = local as usize * block;
+        packed.extend_from_slice(&values[start..start + block]);
+    }
+    packed
+}
+
+/// Known messages both ways: every send has its receive.
+fn swap(world: &World, sends: &[(usize, Vec<f64>)], receives: Vec<(usize, &mut [f64])>) {
+    const TAG: i32 = 17;
+    let comm = world.comm();
+    let count = sends.len() + receives.len();
+    if count == 0 {
+        return;
+    }
+    mpi::request::multiple_scope(count, |scope, requests| {
+        for (rank, buffer) in receives {
+            let process = comm.process_at_rank(rank as i32);
+            requests.add(process.immediate_receive_into_with_tag(scope, buffer, TAG));
+        }
+        for (rank, values) in sends {
+            let process = comm.process_at_rank(*rank as i32);
+            requests.add(process.immediate_send_with_tag(scope, &values[..], TAG));
+        }
+        let mut done = Vec::with_capacity(count);
+        requests.wait_all(&mut done);
+    });
+}

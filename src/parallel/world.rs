@@ -1,0 +1,151 @@
+//! The communicator with typed reductions. Every method but `rank` and `size` is collective.
+
+use std::cell::Cell;
+
+use mpi::collective::SystemOperation;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::*;
+
+use crate::error::{Error, Result};
+
+/// All ranks of a run.
+pub struct World {
+    comm: SimpleCommunicator,
+    /// Sparse exchanges so far: consecutive ones use different tags.
+    exchanges: Cell<i32>,
+}
+
+impl World {
+    pub fn new(comm: SimpleCommunicator) -> Self {
+        World { comm, exchanges: Cell::new(0) }
+    }
+
+    pub fn comm(&self) -> &SimpleCommunicator {
+        &self.comm
+    }
+
+    pub fn rank(&self) -> usize {
+        self.comm.rank() as usize
+    }
+
+    pub fn size(&self) -> usize {
+        self.comm.size() as usize
+    }
+
+    pub fn is_root(&self) -> bool {
+        self.comm.rank() == 0
+    }
+
+    /// A tag for the next sparse exchange; the same on all ranks, as exchanges are collective.
+    pub(super) fn next_tag(&self) -> i32 {
+        let count = self.exchanges.get();
+        self.exchanges.set((count + 1) % 1000);
+        100 + count
+    }
+
+    fn reduce(&self, value: f64, operation: SystemOperation) -> f64 {
+        let mut result = 0.0;
+        self.comm.all_reduce_into(&value, &mut result, operation);
+        result
+    }
+
+    pub fn sum(&self, value: f64) -> f64 {
+        self.reduce(value, SystemOperation::sum())
+    }
+
+    /// NaN on any rank gives NaN.
+    pub fn max(&self, value: f64) -> f64 {
+        if self.any(value.is_nan()) { f64::NAN } else { self.reduce(value, SystemOperation::max()) }
+    }
+
+    pub fn min(&self, value: f64) -> f64 {
+        if self.any(value.is_nan()) { f64::NAN } else { self.reduce(value, SystemOperation::min()) }
+    }
+
+    pub fn min_u64(&self, value: u64) -> u64 {
+        let mut result = 0u64;
+        self.comm.all_reduce_into(&value, &mut result, SystemOperation::min());
+        result
+    }
+
+    pub fn max_usize(&self, value: usize) -> usize {
+        let mut result = 0u64;
+        self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::max());
+        result as usize
+    }
+
+    pub fn sum_usize(&self, value: usize) -> usize {
+        let mut result = 0u64;
+        self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::sum());
+        result as usize
+    }
+
+    /// Element by element; slices of equal length on all ranks.
+    pub fn sum_slice(&self, values: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; values.len()];
+        self.comm.all_reduce_into(values, &mut result[..], SystemOperation::sum());
+        result
+    }
+
+    /// Sum over the lower ranks; 0 on the first.
+    pub fn exclusive_sum(&self, value: usize) -> usize {
+        let mut result = 0u64;
+        self.comm.exclusive_scan_into(&(value as u64), &mut result, SystemOperation::sum());
+        if self.is_root() { 0 } else { result as usize }
+    }
+
+    /// True on all ranks if true on any.
+    pub fn any(&self, value: bool) -> bool {
+        let mut result = 0i32;
+        self.comm.all_reduce_into(&i32::from(value), &mut result, SystemOperation::max());
+        result != 0
+    }
+
+    pub fn barrier(&self) {
+        self.comm.barrier();
+    }
+
+    /// The bytes of `root`, on all ranks.
+    pub fn broadcast_bytes(&self, root: usize, bytes: &mut Vec<u8>) {
+        let mut length = bytes.len() as u64;
+        let process = self.comm.process_at_rank(root as i32);
+        process.broadcast_into(&mut length);
+        bytes.resize(length as usize, 0);
+        process.broadcast_into(&mut bytes[..]);
+    }
+
+    /// The message of the lowest rank that has one, on all ranks.
+    pub fn first_message(&self, message: Option<String>) -> Option<String> {
+        let speaker = self.min_u64(match message {
+            Some(_) => self.rank() as u64,
+            None => u64::MAX,
+        });
+        if speaker == u64::MAX {
+            return None;
+        }
+        let mut bytes = message.unwrap_or_default().into_bytes();
+        self.broadcast_bytes(speaker as usize, &mut bytes);
+        Some(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// Fails on all ranks, with the error of the lowest failing rank, if it failed on any: call
+    /// it before the next collective operation so that nobody waits for a rank that is gone.
+    pub fn fail_together<T>(&self, outcome: Result<T>) -> Result<T> {
+        let code = outcome.as_ref().err().map_or(0, Error::exit_code);
+        let text = outcome.as_ref().err().map(|error| format!("{code}{error}"));
+        match (outcome, self.first_message(text)) {
+            (Ok(value), None) => Ok(value),
+            (_, message) => {
+                let message = message.unwrap_or_default();
+                let (code, text) = message.split_at(message.len().min(1));
+                let text = text.to_string();
+                Err(match code {
+                    "2" => Error::Input(text),
+                    "3" => Error::File(text),
+                    "4" => Error::Environment(text),
+                    _ => Error::Run(text),
+                })
+            }
+        }
+    }
+}
