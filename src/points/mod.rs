@@ -6,6 +6,8 @@
 //! | `seed.rs` | deck bodies -> points |
 //! | `sort.rs` | points in the order of their cells |
 
+pub mod sort;
+
 use nalgebra::Matrix3;
 
 /// Declares the struct of arrays and everything that must treat each field alike: packing for
