@@ -65,10 +65,8 @@ pub fn exchange<T: Pod>(
                         Err(request) => barrier = Some(request),
                     },
                     None => {
-                        sends = sends
-                            .into_iter()
-                            .filter_map(|request| request.test().err())
-                            .collect();
+                        sends =
+                            sends.into_iter().filter_map(|request| request.test().err()).collect();
                         if sends.is_empty() {
                             barrier = Some(comm.immediate_barrier());
                         }

@@ -82,9 +82,7 @@ impl HaloPlan {
         let packed: Vec<(usize, Vec<f64>)> = self
             .ghosts
             .iter()
-            .map(|(rank, range)| {
-                (*rank, values[range.start * block..range.end * block].to_vec())
-            })
+            .map(|(rank, range)| (*rank, values[range.start * block..range.end * block].to_vec()))
             .collect();
         let mut received: Vec<Vec<f64>> =
             self.copies.iter().map(|(_, locals)| vec![0.0; locals.len() * block]).collect();

@@ -6,14 +6,22 @@
 //! | `exchange.rs` | sparse exchange with unknown senders |
 //! | `halo.rs` | fixed exchange between owners and copies |
 //! | `bricks.rs` | units of partition on a lattice |
+//! | `cells.rs` | units of partition on a mesh |
 //! | `metis.rs` | the partitioner |
 //! | `partition.rs` | owner of each unit, cell and node |
 //! | `migrate.rs` | points to the ranks that own their cells |
 
+pub mod bricks;
+pub mod cells;
 pub mod exchange;
 pub mod halo;
+pub mod metis;
+pub mod migrate;
+pub mod partition;
 pub mod world;
 
 pub use exchange::exchange;
 pub use halo::HaloPlan;
+pub use migrate::migrate;
+pub use partition::Partition;
 pub use world::World;

@@ -96,7 +96,7 @@ impl Ksp {
     /// the old preconditioner is to serve on. Another matrix may have another size and pattern.
     pub fn set_operators(&mut self, matrix: &Matrix) -> Result<()> {
         if self.matrix != 0 && self.matrix != matrix.id() {
-            petsc!(KSPReset(self.raw))?;
+            forget(self.raw)?;
         }
         self.matrix = matrix.id();
         petsc!(KSPSetOperators(self.raw, matrix.raw(), matrix.raw()))
@@ -131,6 +131,22 @@ impl Drop for Ksp {
             unsafe { sys::KSPDestroy(&mut self.raw) };
         }
     }
+}
+
+/// Drops all that belongs to the old matrix, so that one of another size can follow. A reset is
+/// not enough: GAMG would keep its levels. The preconditioner is made anew from its options.
+pub(super) fn forget(ksp: sys::KSP) -> Result<()> {
+    petsc!(KSPReset(ksp))?;
+    let (mut pc, mut kind) = (null_mut(), null());
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    petsc!(PCGetType(pc, &mut kind))?;
+    if kind.is_null() {
+        return Ok(());
+    }
+    let kind = c_text(&text_of(kind))?;
+    petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
+    petsc!(PCSetType(pc, kind.as_ptr()))?;
+    petsc!(PCSetFromOptions(pc))
 }
 
 /// The end of the last solve of a live `KSP`.

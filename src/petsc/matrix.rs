@@ -298,7 +298,7 @@ fn check_rows(
 ) -> Result<()> {
     let fail = |what: String| Err(Error::Environment(format!("matrix pattern: {what}")));
     let rows = own.len();
-    if block_size == 0 || rows % block_size != 0 {
+    if block_size == 0 || !rows.is_multiple_of(block_size) {
         return fail(format!("{rows} rows are not whole blocks of {block_size}"));
     }
     if row_offsets.len() != rows + 1 || row_offsets[0] != 0 {

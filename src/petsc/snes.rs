@@ -78,6 +78,8 @@ struct Context<'a, P> {
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
+    /// The last residual was asked for outside its domain.
+    outside: bool,
     linear_solves: usize,
     linear_total: usize,
     linear_max: usize,
@@ -142,7 +144,7 @@ impl Snes {
         x: &mut Vector,
     ) -> Result<NewtonOutcome> {
         if self.matrix != 0 && self.matrix != matrix.id() {
-            petsc!(SNESReset(self.raw))?;
+            self.forget()?;
         }
         self.matrix = matrix.id();
         let raw_matrix = matrix.raw();
@@ -152,6 +154,7 @@ impl Snes {
             comm: &self.comm,
             error: None,
             diverged: None,
+            outside: false,
             linear_solves: 0,
             linear_total: 0,
             linear_max: 0,
@@ -172,7 +175,7 @@ impl Snes {
         petsc!(KSPSetPostSolve(inner, None, null_mut()))?;
         if let Some(error) = context.error.take() {
             // The loop was left in the middle: nothing of its state is of use.
-            petsc!(SNESReset(self.raw))?;
+            self.forget()?;
             return Err(error);
         }
         solved?;
@@ -183,6 +186,8 @@ impl Snes {
         let converged = reason > 0;
         let reason = match (context.diverged, context.linear_failure) {
             _ if converged => "converged".to_owned(),
+            // Line searches have their own word for it.
+            _ if context.outside => "DIVERGED_FUNCTION_DOMAIN".to_owned(),
             (Some(why), _) => why,
             (None, Some(why)) if reason == sys::SNES_DIVERGED_LINEAR_SOLVE => why,
             _ => text_of(text),
@@ -194,6 +199,14 @@ impl Snes {
             converged,
             reason,
         })
+    }
+
+    /// Drops the vectors and factors of the last matrix; options and limits stay.
+    fn forget(&self) -> Result<()> {
+        let mut inner = null_mut();
+        petsc!(SNESReset(self.raw))?;
+        petsc!(SNESGetKSP(self.raw, &mut inner))?;
+        ksp::forget(inner)
     }
 }
 
@@ -247,8 +260,8 @@ unsafe extern "C" fn residual<P: NewtonProblem>(
         context.problem.residual(&x, &mut f)
     });
     context.settle(result, |context, inside| {
-        let outside = context.largest(i32::from(!inside)) == 1;
-        if outside { petsc!(SNESSetFunctionDomainError(snes)) } else { Ok(()) }
+        context.outside = context.largest(i32::from(!inside)) == 1;
+        if context.outside { petsc!(SNESSetFunctionDomainError(snes)) } else { Ok(()) }
     })
 }
 

@@ -8,6 +8,7 @@
 
 pub mod file;
 pub mod seed;
+pub mod sort;
 
 use nalgebra::Matrix3;
 
