@@ -1,8 +1,75 @@
 //! `input.toml`: text to a checked [`Deck`].
+//!
+//! | file | idea |
+//! |---|---|
+//! | `model.rs` | the checked deck as typed data |
+//! | `words.rs`, `fields.rs` | the deck's words for enumerations and point fields |
+//! | `schema/` | every key once: type, unit, default, range, meaning |
+//! | `tree.rs` | TOML to values with their places; `--set` |
+//! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |
+//! | `sections/` | each section's values and the checks across sections |
+//! | `resolved.rs` | the deck with every default, as TOML |
+//! | `reference.rs` | the schema as documentation |
+//! | `expression/`, `shape.rs` | formulas; regions of space |
+
 pub mod expression;
+pub mod fields;
 pub mod model;
+mod problems;
+mod reader;
+pub mod reference;
+mod resolved;
+pub mod schema;
+mod sections;
 pub mod shape;
+mod tree;
+mod words;
+
+use std::path::{Path, PathBuf};
 
 pub use expression::{Expression, Scope};
 pub use model::Deck;
+pub use resolved::resolved;
 pub use shape::Shape;
+
+use crate::error::{Error, Result};
+use problems::{Problems, Sources};
+use tree::Origin;
+
+/// Reads and checks a deck. `path` names it in messages, and relative paths inside it start at
+/// its folder; `sets` are the `KEY=VALUE` of `--set`, applied in order before the checks.
+/// Error: up to ten problems, each with its place and what would be right.
+pub fn read(path: &Path, text: &str, sets: &[String]) -> Result<Deck> {
+    let sources = Sources { file: path.display().to_string(), text, sets };
+    let problems = Problems::new(sources);
+    let deck = checked(&problems, path, text, sets);
+    match (problems.into_error(), deck) {
+        (Some(error), _) => Err(error),
+        (None, Ok(deck)) => Ok(deck),
+        (None, Err(_)) => Err(Error::Input(format!("{}: unreadable deck", path.display()))),
+    }
+}
+
+fn checked(
+    problems: &Problems<'_>,
+    path: &Path,
+    text: &str,
+    sets: &[String],
+) -> problems::Got<Deck> {
+    let mut root = tree::parse_document(text).map_err(|(span, message)| {
+        let origin = span.map_or(Origin::Nowhere, Origin::Text);
+        problems.report(&origin, "", format!("not valid TOML: {message}"), String::new())
+    })?;
+    for (index, option) in sets.iter().enumerate() {
+        tree::apply_set(&mut root, option, index)
+            .map_err(|why| problems.report(&Origin::Set(index), "", why, String::new()))?;
+    }
+    sections::deck(problems, &root, &directory(path))
+}
+
+/// Folder of the deck, absolute so that the resolved deck works from anywhere.
+fn directory(path: &Path) -> PathBuf {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    std::path::absolute(folder).unwrap_or_else(|_| folder.to_path_buf())
+}

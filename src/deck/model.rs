@@ -9,7 +9,7 @@ use super::expression::Expression;
 use super::shape::Shape;
 
 /// A complete, checked input deck.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Deck {
     pub title: String,
     /// 2 (plane strain) or 3, from the grid.
@@ -41,7 +41,7 @@ pub enum AnalysisType {
     Conditioning,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
     pub kind: AnalysisType,
     /// Equal load steps or time steps; `None` only with `cfl`.
@@ -76,7 +76,7 @@ pub enum InvertedIterates {
     Allow,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Method {
     pub basis: Basis,
     pub domain_update: DomainUpdate,
@@ -133,7 +133,7 @@ pub enum StressUpdate {
 }
 
 /// Ghost stabilisation parameters. Absolute values win over factors.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ghost {
     /// gamma_K, Pa.
     pub stiffness: Option<f64>,
@@ -154,13 +154,13 @@ pub enum GhostScaling {
     Published,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Grid {
     Lattice(LatticeGrid),
     Mesh(MeshGrid),
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct LatticeGrid {
     /// m
     pub origin: Vec<f64>,
@@ -170,13 +170,13 @@ pub struct LatticeGrid {
     pub cells: Vec<usize>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct MeshGrid {
     pub source: MeshSource,
     pub motion: MeshMotion,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum MeshSource {
     /// Gmsh 4.1 file, absolute or relative to the deck's folder (already joined).
     File(PathBuf),
@@ -217,7 +217,7 @@ pub enum MeshMotion {
     Material,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     pub name: String,
     pub model: MaterialModel,
@@ -242,6 +242,7 @@ impl MaterialModel {
 }
 
 #[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     pub name: String,
     /// Index into `Deck::materials`.
@@ -253,7 +254,7 @@ pub struct Body {
     pub velocity: Vec<Expression>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum BodySource {
     Shape {
         shape: Shape,
@@ -268,7 +269,7 @@ pub enum BodySource {
     },
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Seeding {
     /// Equal sub-cells per grid cell, per axis; on a mesh the equivalent number per element.
     PerCell(Vec<usize>),
@@ -279,7 +280,7 @@ pub enum Seeding {
     Gauss(usize),
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
     pub name: String,
     pub place: Place,
@@ -292,7 +293,7 @@ pub struct Boundary {
     pub rotation: Option<Rotation>,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Rotation {
     /// m
     pub centre: Vec<f64>,
@@ -300,7 +301,7 @@ pub struct Rotation {
     pub degrees: f64,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Place {
     /// A face of the lattice: axis and whether it is the upper end.
     /// left/right: x; bottom/top: y; back/front: z.
@@ -314,7 +315,7 @@ pub enum Place {
     CellsOf { body: usize },
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Load {
     /// Total force, N (2D: N/m), shared equally by the points nearest to the given places.
     Point { body: usize, nearest: Vec<Vec<f64>>, force: Vec<f64> },
@@ -328,7 +329,7 @@ pub enum Load {
     Manufactured(Vec<Expression>),
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Verify {
     pub name: String,
     /// e.g. `stress.yy`, `displacement.x`, `displacement`, `velocity.x`, `J`.
@@ -349,7 +350,7 @@ pub enum VerifyNorm {
     Max,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     pub every: Every,
     /// Point fields to write.

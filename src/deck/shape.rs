@@ -128,8 +128,9 @@ impl Shape {
         let dimension = low.len();
         let mut bounds = (vec![f64::INFINITY; dimension], vec![f64::NEG_INFINITY; dimension]);
         for corner in 0..1 << dimension {
-            let local: Vec<f64> =
-                (0..dimension).map(|a| if corner >> a & 1 == 0 { low[a] } else { high[a] }).collect();
+            let local: Vec<f64> = (0..dimension)
+                .map(|a| if corner >> a & 1 == 0 { low[a] } else { high[a] })
+                .collect();
             let global = self.placement.globalise(padded(&local));
             for a in 0..dimension {
                 bounds.0[a] = bounds.0[a].min(global[a]);

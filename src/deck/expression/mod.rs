@@ -181,9 +181,7 @@ impl Expression {
         let variables: Vec<Variable> = flat
             .var_names()
             .iter()
-            .map(|name| {
-                Variable::from_name(name).ok_or_else(|| grammar::unknown_name(&text, name))
-            })
+            .map(|name| Variable::from_name(name).ok_or_else(|| grammar::unknown_name(&text, name)))
             .collect::<Result<_, _>>()?;
         if variables.is_empty() {
             let value = flat.eval(&[]).map_err(|e| format!("cannot read \"{text}\": {e}"))?;

@@ -103,7 +103,9 @@ fn second_derivatives_agree_with_differences() {
         let h = 1e-5;
         let difference =
             (first.value(&at(0.6, 0.8 + h)) - first.value(&at(0.6, 0.8 - h))) / (2.0 * h);
-        assert!((second.value(&at(0.6, 0.8)) - difference).abs() < 1e-7 * difference.abs().max(1.0));
+        assert!(
+            (second.value(&at(0.6, 0.8)) - difference).abs() < 1e-7 * difference.abs().max(1.0)
+        );
     }
 }
 

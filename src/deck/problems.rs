@@ -1,0 +1,144 @@
+//! What is wrong with a deck: collected, then said with file, line, column and the text itself.
+
+use std::cell::RefCell;
+
+use super::tree::Origin;
+use crate::error::Error;
+
+/// Problems shown at once.
+const SHOWN: usize = 10;
+
+/// The sources of a deck, for messages.
+#[derive(Debug)]
+pub struct Sources<'a> {
+    /// As the user named the file.
+    pub file: String,
+    pub text: &'a str,
+    pub sets: &'a [String],
+}
+
+#[derive(Debug, PartialEq)]
+struct Problem {
+    origin: Origin,
+    /// Dotted key, or empty.
+    key: String,
+    message: String,
+    help: String,
+}
+
+/// Collects problems in the order they are found.
+#[derive(Debug)]
+pub struct Problems<'a> {
+    sources: Sources<'a>,
+    found: RefCell<Vec<Problem>>,
+}
+
+/// A problem was reported; the value cannot be had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reported;
+
+/// A value, or the knowledge that a problem was reported.
+pub type Got<T> = Result<T, Reported>;
+
+impl<'a> Problems<'a> {
+    pub fn new(sources: Sources<'a>) -> Self {
+        Problems { sources, found: RefCell::new(Vec::new()) }
+    }
+
+    /// Reports a problem at `origin` about the dotted `key`; `help` may be empty.
+    pub fn report(&self, origin: &Origin, key: &str, message: String, help: String) -> Reported {
+        let problem = Problem { origin: origin.clone(), key: key.to_string(), message, help };
+        let mut found = self.found.borrow_mut();
+        // A section that is read twice says the same twice.
+        if !found.contains(&problem) {
+            found.push(problem);
+        }
+        Reported
+    }
+
+    /// The problems as one error, if there are any.
+    pub fn into_error(self) -> Option<Error> {
+        let mut found = self.found.into_inner();
+        if found.is_empty() {
+            return None;
+        }
+        // In the order of the text; options after it.
+        found.sort_by_key(|problem| match &problem.origin {
+            Origin::Text(span) => (0, span.start),
+            Origin::Nowhere => (1, 0),
+            Origin::Set(index) => (2, *index),
+        });
+        let hidden = found.len().saturating_sub(SHOWN);
+        let mut text: Vec<String> =
+            found.iter().take(SHOWN).map(|problem| self.sources.render(problem)).collect();
+        if hidden > 0 {
+            text.push(format!("... and {hidden} more"));
+        }
+        Some(Error::Input(text.join("\n")))
+    }
+}
+
+impl Sources<'_> {
+    fn render(&self, problem: &Problem) -> String {
+        let key = match problem.key.as_str() {
+            "" => String::new(),
+            key => format!("{key}: "),
+        };
+        let message = &problem.message;
+        let mut out = match &problem.origin {
+            Origin::Nowhere => format!("{}: {key}{message}", self.file),
+            Origin::Set(index) => {
+                let option = self.sets.get(*index).map_or("", String::as_str);
+                format!("--set {option}: {key}{message}")
+            }
+            Origin::Text(span) => {
+                let (line, column, content) = self.locate(span.start);
+                let number = line.to_string();
+                let margin = " ".repeat(number.len());
+                let marked = self.text.get(span.clone()).unwrap_or("");
+                let marked = marked.lines().next().unwrap_or("").chars().count().max(1);
+                let indent: String = content
+                    .chars()
+                    .take(column - 1)
+                    .map(|c| if c == '\t' { '\t' } else { ' ' })
+                    .collect();
+                format!(
+                    "{}:{line}:{column}: {key}{message}\n {margin} |\n {number} | {content}\n {margin} | {indent}{}",
+                    self.file,
+                    "^".repeat(marked)
+                )
+            }
+        };
+        for line in problem.help.lines() {
+            out.push_str("\n   = ");
+            out.push_str(line);
+        }
+        out
+    }
+
+    /// Line and column from one, and the line itself.
+    fn locate(&self, offset: usize) -> (usize, usize, &str) {
+        let offset = offset.min(self.text.len());
+        let before = self.text.get(..offset).unwrap_or(self.text);
+        let line = before.matches('\n').count() + 1;
+        let start = before.rfind('\n').map_or(0, |at| at + 1);
+        let column = before[start..].chars().count() + 1;
+        let content = self.text[start..].lines().next().unwrap_or("");
+        (line, column, content)
+    }
+}
+
+/// The known name nearest to a mistyped one, if one is near enough to be meant.
+pub fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    known
+        .into_iter()
+        .map(|candidate| {
+            let (a, b) = (name.to_lowercase(), candidate.to_lowercase());
+            let prefix = a.len() >= 3 && (b.starts_with(&a) || a.starts_with(&b));
+            let distance = strsim::damerau_levenshtein(&a, &b);
+            (if prefix { distance.min(1) } else { distance }, candidate)
+        })
+        .min_by_key(|(distance, _)| *distance)
+        .filter(|(distance, candidate)| *distance <= (candidate.len().max(name.len()) / 3).max(1))
+        .map(|(_, candidate)| candidate)
+}

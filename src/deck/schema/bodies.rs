@@ -1,0 +1,214 @@
+//! Keys of what is analysed: materials, bodies, shapes, boundaries and loads.
+
+use super::Kind::{
+    Choice, Choices, Count, CountOrCounts, Expression, Expressions, Number, Points, Special, Table,
+    Text, Vector,
+};
+use super::Need::{Optional, Required};
+use super::{AXES, POSITIVE, Section, at_least, between, inside, key};
+
+const SHAPES: &str = "an array of shapes";
+const BALL_KEYS: &[super::Key] = &[
+    key("centre", Vector, Required, "Centre.").unit("m"),
+    key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
+];
+
+pub const SECTIONS: &[Section] = &[
+    Section {
+        name: "material",
+        header: "[material.NAME]",
+        doc: "A material, by a name of your own.",
+        keys: &[
+            key("model", Choice(&["hencky", "von-mises"]), Required,
+                "Hencky elasticity, alone or with perfect von Mises plasticity."),
+            key("young", Number, Required, "Young's modulus.").unit("Pa").range(POSITIVE),
+            key("poisson", Number, Required, "Poisson's ratio.").range(inside(-1.0, 0.5)),
+            key("yield", Number, Optional("needed by von-mises, only there"),
+                "rho_y: radius sqrt(2 J2) of the Kirchhoff stress at yield (Lagrangian eq. 43).")
+                .unit("Pa").range(POSITIVE),
+        ],
+    },
+    Section {
+        name: "body",
+        header: "[[body]]",
+        doc: "A body: a shape filled with points, or a file of points. One of points_per_cell, lattice and gauss.",
+        keys: &[
+            key("name", Text, Optional("body-1, body-2, ..."), "Its name, unique."),
+            key("material", Text, Required, "Name of a `[material.NAME]`."),
+            key("density", Number, Optional("0; needed by dynamics and gravity"), "Initial density.")
+                .unit("kg/m3").range(at_least(0.0)),
+            key("shape", Table("shape"), Required, "The region it fills, or where its points are."),
+            key("points_per_cell", CountOrCounts, Optional("2, when lattice and gauss are absent"),
+                "Equal sub-cells per cell and axis.").range(between(1.0, 100.0)),
+            key("lattice", Table("body.lattice"), Optional("none"),
+                "Points on a lattice of their own."),
+            key("gauss", Count, Optional("none"),
+                "Gauss points per axis and cell: updated-Lagrangian finite elements, with basis = \"mpm\" and motion = { follow = \"material\" }.")
+                .range(between(1.0, 4.0)),
+            key("velocity", Expressions("X Y Z"), Optional("zeros"), "Initial velocity.")
+                .unit("m/s"),
+        ],
+    },
+    Section {
+        name: "body.lattice",
+        header: "body.lattice",
+        doc: "Points at offset + (i, j, k) spacing, kept where they are inside; volume spacing^D.",
+        keys: &[
+            key("spacing", Number, Required, "Distance of neighbours.").unit("m").range(POSITIVE),
+            key("offset", Vector, Optional("zeros"),
+                "Position of one point, in the shape's frame before `rotate` and `translate`.")
+                .unit("m"),
+        ],
+    },
+    Section {
+        name: "shape",
+        header: "shape",
+        doc: "One form, and where it is put. `points` and `cells` only directly in a body.",
+        keys: &[
+            key("box", Table("shape.box"), Optional("-"), "Axis-aligned box."),
+            key("disc", Table("shape.disc"), Optional("-"), "Disc (a ball in 3D)."),
+            key("ball", Table("shape.ball"), Optional("-"), "The same as disc."),
+            key("ellipse", Table("shape.ellipse"), Optional("-"), "Ellipse (an ellipsoid in 3D)."),
+            key("ellipsoid", Table("shape.ellipsoid"), Optional("-"), "The same as ellipse."),
+            key("capsule", Table("shape.capsule"), Optional("-"), "Segment with a round radius."),
+            key("polygon", Table("shape.polygon"), Optional("-"), "2D, also non-convex."),
+            key("where", Text, Optional("-"),
+                "Condition on x, y, z in the shape's frame, such as \"x*x + y < 1\"; bound it with intersection."),
+            key("union", Special(SHAPES), Optional("-"), "Points in any of them."),
+            key("intersection", Special(SHAPES), Optional("-"), "Points in all of them."),
+            key("difference", Special(SHAPES), Optional("-"), "The first minus the others."),
+            key("points", Text, Optional("-"),
+                "csv file with the header x,y[,z],volume[,vx,vy,vz], beside the deck."),
+            key("cells", Text, Optional("-"),
+                "Cells of a mesh with this tag, or \"all\"."),
+            key("rotate", Table("shape.rotate"), Optional("not turned"),
+                "Turns the form, before translate."),
+            key("translate", Vector, Optional("not moved"), "Moves the form.").unit("m"),
+        ],
+    },
+    Section {
+        name: "shape.box",
+        header: "shape.box",
+        doc: "min <= x <= max.",
+        keys: &[
+            key("min", Vector, Required, "Lower corner.").unit("m"),
+            key("max", Vector, Required, "Upper corner.").unit("m"),
+        ],
+    },
+    Section { name: "shape.disc", header: "shape.disc", doc: "|x - centre| <= radius.", keys: BALL_KEYS },
+    Section { name: "shape.ball", header: "shape.ball", doc: "|x - centre| <= radius.", keys: BALL_KEYS },
+    Section { name: "shape.ellipse", header: "shape.ellipse", doc: "Axes along the coordinates.", keys: ELLIPSE_KEYS },
+    Section { name: "shape.ellipsoid", header: "shape.ellipsoid", doc: "Axes along the coordinates.", keys: ELLIPSE_KEYS },
+    Section {
+        name: "shape.capsule",
+        header: "shape.capsule",
+        doc: "All within `radius` of a segment.",
+        keys: &[
+            key("from", Vector, Required, "One end.").unit("m"),
+            key("to", Vector, Required, "The other end.").unit("m"),
+            key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
+        ],
+    },
+    Section {
+        name: "shape.polygon",
+        header: "shape.polygon",
+        doc: "Even-odd rule.",
+        keys: &[key("vertices", Points, Required, "Corners in order, three or more.").unit("m")],
+    },
+    Section {
+        name: "shape.rotate",
+        header: "shape.rotate",
+        doc: "Right-handed; in 2D counter-clockwise.",
+        keys: &[
+            key("degrees", Number, Required, "Angle.").unit("deg"),
+            key("about", Vector, Optional("zeros"), "A point that stays.").unit("m"),
+            key("axis", Vector, Optional("z"), "3D: direction of the axis."),
+        ],
+    },
+    Section {
+        name: "boundary",
+        header: "[[boundary]]",
+        doc: "Prescribed displacement of grid nodes: at least one of fix, displacement and rotation.",
+        keys: &[
+            key("name", Text, Optional("boundary-1, boundary-2, ..."),
+                "Names the reaction columns, unique."),
+            key("where", Table("where"), Required, "Which nodes."),
+            key("fix", Choices(&AXES), Optional("none"), "Components held at zero."),
+            key("displacement", Table("displacement"), Optional("none"), "Prescribed components."),
+            key("rotation", Table("rotation"), Optional("none"), "Rigid rotation (x and y)."),
+        ],
+    },
+    Section {
+        name: "where",
+        header: "boundary.where",
+        doc: "One of the four.",
+        keys: &[
+            key("side", Choice(SIDES), Optional("-"), "A face of the lattice."),
+            key("box", Table("where.box"), Optional("-"),
+                "Nodes in or on a box (tolerance 1e-9 of a cell), in start positions."),
+            key("tag", Text, Optional("-"), "Nodes of a tag of the mesh."),
+            key("cells_of", Text, Optional("-"),
+                "Nodes of the cells that hold the outermost points of a body, found anew in each step (Lagrangian §7.2)."),
+        ],
+    },
+    Section {
+        name: "where.box",
+        header: "boundary.where.box",
+        doc: "A plane, a line or a node where min equals max.",
+        keys: &[
+            key("min", Vector, Required, "Lower corner.").unit("m"),
+            key("max", Vector, Required, "Upper corner.").unit("m"),
+        ],
+    },
+    Section {
+        name: "displacement",
+        header: "boundary.displacement",
+        doc: "Total over the analysis; a value without `s` or `t` is ramped with the load factor.",
+        keys: &[
+            key("x", Expression("X Y Z s t"), Optional("free"), "Component x.").unit("m"),
+            key("y", Expression("X Y Z s t"), Optional("free"), "Component y.").unit("m"),
+            key("z", Expression("X Y Z s t"), Optional("free"), "Component z.").unit("m"),
+        ],
+    },
+    Section {
+        name: "rotation",
+        header: "boundary.rotation",
+        doc: "Total over the analysis, counter-clockwise about z.",
+        keys: &[
+            key("centre", Vector, Optional("zeros"), "Centre.").unit("m"),
+            key("degrees", Number, Required, "Angle.").unit("deg"),
+        ],
+    },
+    Section {
+        name: "load",
+        header: "[[load]]",
+        doc: "One of the four.",
+        keys: &[
+            key("point", Table("load.point"), Optional("-"), "Force held by material points."),
+            key("gravity", Vector, Optional("-"), "Acceleration.").unit("m/s2"),
+            key("body_force", Expressions("X Y Z x y z s t"), Optional("-"),
+                "Force per initial volume; without s or t ramped in quasi-static analyses.")
+                .unit("N/m3"),
+            key("manufactured", Expressions("X Y Z s"), Optional("-"),
+                "The body force that makes this displacement field exact.").unit("m"),
+        ],
+    },
+    Section {
+        name: "load.point",
+        header: "load.point",
+        doc: "Shared equally by the points nearest to the given places.",
+        keys: &[
+            key("body", Text, Optional("the only body"), "Name of the body."),
+            key("nearest", Points, Required, "Places, one point each.").unit("m"),
+            key("force", Vector, Required, "Total force (per metre in plane strain).").unit("N"),
+        ],
+    },
+];
+
+const ELLIPSE_KEYS: &[super::Key] = &[
+    key("centre", Vector, Required, "Centre.").unit("m"),
+    key("semi_axes", Vector, Required, "Semi-axes.").unit("m").range(POSITIVE),
+];
+
+/// Faces of a box: axis = index / 2, upper = odd.
+pub const SIDES: &[&str] = &["left", "right", "bottom", "top", "back", "front"];

@@ -1,0 +1,188 @@
+//! The schema: every key of the deck once, with type, unit, default, range and meaning.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `mod.rs` | what a key is |
+//! | `problem.rs` | keys of the analysis: analysis, method, ghost, grid, outputs |
+//! | `bodies.rs` | keys of what is analysed: materials, bodies, shapes, boundaries, loads |
+//!
+//! Known keys, type and range checks, defaults, the resolved deck and `docs/deck.md` all come
+//! from here.
+
+mod bodies;
+mod problem;
+
+pub use bodies::SIDES;
+
+/// Components of a direction, in order.
+pub const AXES: [&str; 3] = ["x", "y", "z"];
+
+/// What a value may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    Text,
+    Number,
+    /// A whole number.
+    Count,
+    Choice(&'static [&'static str]),
+    /// A list of some of these words.
+    Choices(&'static [&'static str]),
+    /// A number or a formula in these variables.
+    Expression(&'static str),
+    /// One number or formula per axis.
+    Expressions(&'static str),
+    /// One number per axis.
+    Vector,
+    /// Whole numbers, one per axis.
+    Counts,
+    /// One number for all axes, or one per axis.
+    NumberOrVector,
+    /// One whole number for all axes, or one per axis.
+    CountOrCounts,
+    /// A list of positions.
+    Points,
+    Table(&'static str),
+    /// A table whose keys the user names.
+    Named(&'static str),
+    /// An array of tables.
+    Tables(&'static str),
+    /// Read by its own code; the text says what is accepted.
+    Special(&'static str),
+}
+
+impl Kind {
+    /// For messages and documentation.
+    pub fn describe(&self) -> String {
+        match self {
+            Kind::Text => "a string".into(),
+            Kind::Number => "a number".into(),
+            Kind::Count => "a whole number".into(),
+            Kind::Choice(words) => format!("one of {}", quoted(words)),
+            Kind::Choices(words) => format!("an array of {}", quoted(words)),
+            Kind::Expression(variables) => {
+                format!("a number or an expression (string) of {variables}")
+            }
+            Kind::Expressions(variables) => {
+                format!("an array of numbers or expressions (strings) of {variables}, one per axis")
+            }
+            Kind::Vector => "an array of numbers, one per axis".into(),
+            Kind::Counts => "an array of whole numbers, one per axis".into(),
+            Kind::NumberOrVector => "a number, or an array of one per axis".into(),
+            Kind::CountOrCounts => "a whole number, or an array of one per axis".into(),
+            Kind::Points => "an array of positions, each an array of one number per axis".into(),
+            Kind::Table(_) => "a table".into(),
+            Kind::Named(_) => "tables, each under a name of its own".into(),
+            Kind::Tables(_) => "an array of tables".into(),
+            Kind::Special(text) => (*text).into(),
+        }
+    }
+}
+
+pub fn quoted(words: &[&str]) -> String {
+    words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether a key may be left out.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Need {
+    Required,
+    /// The text says when it is needed or what happens without it.
+    Optional(&'static str),
+    /// A TOML value.
+    Default(&'static str),
+}
+
+/// Interval of numbers; the flags say whether an end belongs to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    pub low: f64,
+    pub low_included: bool,
+    pub high: f64,
+    pub high_included: bool,
+}
+
+pub const ANY: Range = between(f64::NEG_INFINITY, f64::INFINITY);
+pub const POSITIVE: Range = Range { low_included: false, ..at_least(0.0) };
+
+pub const fn between(low: f64, high: f64) -> Range {
+    Range { low, low_included: true, high, high_included: true }
+}
+
+pub const fn inside(low: f64, high: f64) -> Range {
+    Range { low, low_included: false, high, high_included: false }
+}
+
+pub const fn at_least(low: f64) -> Range {
+    between(low, f64::INFINITY)
+}
+
+impl Range {
+    pub fn contains(&self, value: f64) -> bool {
+        let above = if self.low_included { value >= self.low } else { value > self.low };
+        let below = if self.high_included { value <= self.high } else { value < self.high };
+        above && below
+    }
+
+    /// Empty for all numbers.
+    pub fn describe(&self) -> String {
+        let low = (self.low > f64::NEG_INFINITY)
+            .then(|| format!("{} {}", if self.low_included { ">=" } else { ">" }, self.low));
+        let high = (self.high < f64::INFINITY)
+            .then(|| format!("{} {}", if self.high_included { "<=" } else { "<" }, self.high));
+        [low, high].into_iter().flatten().collect::<Vec<_>>().join(" and ")
+    }
+}
+
+/// One key of the deck.
+#[derive(Debug, Clone, Copy)]
+pub struct Key {
+    pub name: &'static str,
+    pub kind: Kind,
+    /// SI unit, or empty.
+    pub unit: &'static str,
+    pub need: Need,
+    pub range: Range,
+    pub doc: &'static str,
+}
+
+const fn key(name: &'static str, kind: Kind, need: Need, doc: &'static str) -> Key {
+    Key { name, kind, unit: "", need, range: ANY, doc }
+}
+
+impl Key {
+    const fn unit(self, unit: &'static str) -> Self {
+        Key { unit, ..self }
+    }
+
+    const fn range(self, range: Range) -> Self {
+        Key { range, ..self }
+    }
+}
+
+/// A table of the deck.
+#[derive(Debug, Clone, Copy)]
+pub struct Section {
+    /// Name inside the schema.
+    pub name: &'static str,
+    /// How the table is written in a deck.
+    pub header: &'static str,
+    pub doc: &'static str,
+    pub keys: &'static [Key],
+}
+
+/// All sections, in the order of the documentation.
+pub fn sections() -> impl Iterator<Item = &'static Section> {
+    problem::SECTIONS.iter().chain(bodies::SECTIONS).chain(problem::RESULT_SECTIONS)
+}
+
+/// The section of that name. Names are fixed in this module, so that it always exists.
+pub fn section(name: &str) -> &'static Section {
+    sections().find(|section| section.name == name).expect("sections are named by constants")
+}
+
+impl Section {
+    /// The key of that name, if the section has it.
+    pub fn key(&self, name: &str) -> Option<&'static Key> {
+        self.keys.iter().find(|key| key.name == name)
+    }
+}

@@ -1,0 +1,285 @@
+//! Keys of the analysis, the method and the grid, and of what is written.
+
+use super::Kind::{
+    Choice, Choices, Count, Counts, Named, Number, NumberOrVector, Special, Table, Tables, Text,
+    Vector,
+};
+use super::Need::{Default, Optional, Required};
+use super::{POSITIVE, Section, at_least, between, key};
+use crate::deck::fields::FIELD_NAMES;
+use crate::deck::model::{
+    AnalysisType, Basis, DomainUpdate, Element, Frame, GhostScaling, InvertedIterates, Mass,
+    OnFailure, StressUpdate, VerifyNorm,
+};
+
+pub const SECTIONS: &[Section] = &[
+    Section {
+        name: "",
+        header: "top of the file",
+        doc: "What a deck consists of.",
+        keys: &[
+            key("title", Text, Default("\"\""), "Shown in the banner and stored with the results."),
+            key("analysis", Table("analysis"), Required, "What is solved, and how finely."),
+            key("method", Table("method"), Optional("all defaults"), "Variant of the method."),
+            key("ghost", Table("ghost"), Optional("absent: off"), "Ghost stabilisation."),
+            key("grid", Table("grid"), Required, "Background grid."),
+            key("material", Named("material"), Required, "At least one `[material.NAME]`."),
+            key("body", Tables("body"), Required, "At least one `[[body]]`."),
+            key("boundary", Tables("boundary"), Optional("none"), "Prescribed displacements."),
+            key("load", Tables("load"), Optional("none"), "Forces."),
+            key("verify", Tables("verify"), Optional("none"), "Figures of merit."),
+            key("output", Table("output"), Optional("all defaults"), "What is written, and when."),
+            key("parallel", Table("parallel"), Optional("all defaults"), "Distribution."),
+            key("petsc", Special("a table of strings, numbers or true"), Optional("none"),
+                "PETSc options by name without the dash; `true` is a bare flag."),
+            key("conditioning", Table("conditioning"),
+                Optional("needed by type = \"conditioning\""), "Rigid motion of the study."),
+        ],
+    },
+    Section {
+        name: "analysis",
+        header: "[analysis]",
+        doc: "What is solved, and in which steps.",
+        keys: &[
+            key("type", Choice(AnalysisType::NAMES), Required, "Kind of analysis."),
+            key("steps", Count, Optional("needed, except with cfl"),
+                "Equal load steps or time steps.").range(at_least(1.0)),
+            key("duration", Number, Optional("needed by dynamics, only there"),
+                "Simulated time; the time step is duration / steps.").unit("s").range(POSITIVE),
+            key("cfl", Number, Optional("explicit only, instead of steps"),
+                "Time step as a fraction of the stability limit.").range(POSITIVE),
+            key("tolerance", Number, Default("1e-9"),
+                "Normalised residual that ends the iterations (Lagrangian eq. 40).")
+                .range(POSITIVE),
+            key("max_iterations", Count, Default("20"),
+                "Evaluations of the residual in one step, the first at zero displacement included.")
+                .range(at_least(2.0)),
+            key("on_failure", Choice(OnFailure::NAMES), Default("\"stop\""),
+                "What to do with a step that does not converge: stop, or halve it and retry."),
+            key("smallest_step", Number, Default("0.0009765625"),
+                "With on_failure = \"cut\": smallest step as a fraction of the nominal one.")
+                .range(super::Range { low_included: false, ..between(0.0, 1.0) }),
+            key("inverted_iterates", Choice(InvertedIterates::NAMES), Default("\"reject\""),
+                "Iterates in which a point is turned inside out (det dF <= 0)."),
+            key("newmark_beta", Number, Default("0.25"), "Implicit dynamics.")
+                .range(super::Range { low_included: false, ..between(0.0, 0.5) }),
+            key("newmark_gamma", Number, Default("0.5"), "Implicit dynamics.")
+                .range(between(0.5, 1.0)),
+            key("hht_alpha", Number, Default("0.0"),
+                "Implicit dynamics: numerical damping; sets Newmark's beta and gamma.")
+                .range(between(-1.0 / 3.0, 0.0)),
+        ],
+    },
+    Section {
+        name: "method",
+        header: "[method]",
+        doc: "Variant of the material point method.",
+        keys: &[
+            key("basis", Choice(Basis::NAMES), Default("\"mpm\""),
+                "Basis functions of the points. `gimp` needs a lattice."),
+            key("domain_update", Choice(DomainUpdate::NAMES), Default("\"corners\""),
+                "How GIMP domains follow the deformation (Lagrangian eq. 32-39)."),
+            key("frame", Choice(Frame::NAMES), Default("\"previous\""),
+                "State in which equilibrium is written (Lagrangian §3-5)."),
+            key("mass", Choice(Mass::NAMES), Default("\"consistent\""), "Mass matrix (dynamics)."),
+            key("stress_update", Choice(StressUpdate::NAMES), Default("\"usl\""),
+                "When stress is updated in an explicit step: first, last, or last with remapped velocity."),
+            key("velocity_update", Special("\"flip\", \"pic\", \"xpic\", or a number from 0 (pic) to 1 (flip)"),
+                Default("\"flip\""), "How points take their velocity from the grid (explicit)."),
+            key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
+                "Order m of XPIC(m).").range(at_least(1.0)),
+            key("drop_below", Number, Optional("1e-8 without Ghost stiffness, 0 with it"),
+                "Nodes whose summed basis weight is below this fraction of the largest are held at zero.")
+                .range(between(0.0, 1.0)),
+        ],
+    },
+    Section {
+        name: "ghost",
+        header: "[ghost]",
+        doc: "Ghost stabilisation (Ghost §3). An absolute value or a factor, not both.",
+        keys: &[
+            key("stiffness", Number, Optional("no Ghost stiffness"), "gamma_K.")
+                .unit("Pa").range(at_least(0.0)),
+            key("stiffness_factor", Number, Optional("no Ghost stiffness"),
+                "gamma_K as a multiple of each body's Young's modulus.").range(at_least(0.0)),
+            key("mass", Number, Optional("no Ghost mass"), "gamma_M.")
+                .unit("kg/m3").range(at_least(0.0)),
+            key("mass_factor", Number, Optional("no Ghost mass"),
+                "gamma_M as a multiple of each body's density.").range(at_least(0.0)),
+            key("scaling", Choice(GhostScaling::NAMES), Default("\"scale-free\""),
+                "Scale of the face matrix J: gamma_K J / h2 and gamma_M J (scale-free), J as in eq. 23 (literal), or (h2/4) J (published: reproduces the papers' tables)."),
+        ],
+    },
+    Section {
+        name: "grid",
+        header: "[grid]",
+        doc: "Background grid. Its vectors set the dimension of the problem: two components mean plane strain.",
+        keys: &[
+            key("type", Choice(&["lattice", "mesh"]), Required,
+                "Equal boxes, or an unstructured mesh."),
+            key("origin", Vector, Optional("zeros"), "Lattice: lower corner.").unit("m"),
+            key("size", Vector, Optional("a lattice needs size or cells"),
+                "Lattice: extent, a whole number of cells along each axis.").unit("m").range(POSITIVE),
+            key("cells", Counts, Optional("a lattice needs size or cells"), "Lattice: cells per axis.")
+                .range(at_least(1.0)),
+            key("h", NumberOrVector, Optional("needed by a lattice"), "Lattice: spacing.")
+                .unit("m").range(POSITIVE),
+            key("file", Text, Optional("a mesh needs file or generate"),
+                "Mesh: Gmsh 4.1 file; a relative path starts at the deck."),
+            key("dimension", Count, Optional("2; only with file"), "Mesh from a file: 2 or 3.")
+                .range(between(2.0, 3.0)),
+            key("generate", Table("grid.generate"), Optional("a mesh needs file or generate"),
+                "Mesh: made here."),
+            key("motion", Table("grid.motion"), Optional("the mesh stays"),
+                "Mesh: how it moves between steps."),
+        ],
+    },
+    Section {
+        name: "grid.generate",
+        header: "grid.generate",
+        doc: "One of the two.",
+        keys: &[
+            key("annulus", Table("grid.generate.annulus"), Optional("or box"),
+                "Ring around the origin; tags \"inner\" and \"outer\"."),
+            key("box", Table("grid.generate.box"), Optional("or annulus"),
+                "Box; tags \"left\", \"right\", \"bottom\", \"top\" (3D: \"back\", \"front\")."),
+        ],
+    },
+    Section {
+        name: "grid.generate.annulus",
+        header: "grid.generate.annulus",
+        doc: "A disc with a circular or elliptic hole.",
+        keys: &[
+            key("inner", Special("a radius, or an array of two semi-axes"), Required,
+                "Radius of the hole, or the semi-axes of an elliptic one.").unit("m").range(POSITIVE),
+            key("outer", Number, Required, "Outer radius.").unit("m").range(POSITIVE),
+            key("radial", Count, Required, "Elements along the radius.").range(at_least(1.0)),
+            key("around", Count, Required, "Elements around.").range(at_least(3.0)),
+            key("element", Choice(&["quad4", "tri3"]), Default("\"quad4\""), "Element."),
+            key("grading", Number, Default("1.0"),
+                "Refinement around the ends of the long axis of the hole; 1: uniform.")
+                .range(at_least(1.0)),
+        ],
+    },
+    Section {
+        name: "grid.generate.box",
+        header: "grid.generate.box",
+        doc: "An axis-aligned box of equal elements.",
+        keys: &[
+            key("min", Vector, Required, "Lower corner.").unit("m"),
+            key("max", Vector, Required, "Upper corner.").unit("m"),
+            key("cells", Counts, Required, "Boxes per axis.").range(at_least(1.0)),
+            key("element", Choice(Element::NAMES), Optional("quad4 in 2D, hex8 in 3D"), "Element."),
+        ],
+    },
+    Section {
+        name: "grid.motion",
+        header: "grid.motion",
+        doc: "One of the two.",
+        keys: &[
+            key("rotate_with", Text, Optional("or follow"),
+                "Tag of a boundary with a prescribed rotation: the whole mesh turns with it."),
+            key("follow", Special("\"material\", or an array of axes such as [\"x\"]"),
+                Optional("or rotate_with"),
+                "Nodes follow the computed displacement along these axes; \"material\": wholly."),
+        ],
+    },
+];
+
+pub const RESULT_SECTIONS: &[Section] = &[
+    Section {
+        name: "verify",
+        header: "[[verify]]",
+        doc: "A figure of merit, printed and stored in summary.json.",
+        keys: &[
+            key("name", Text, Required, "Its name there."),
+            key(
+                "field",
+                Special("a field such as \"stress.yy\" or \"displacement\""),
+                Required,
+                "The point field that is compared: a scalar, a component, or a vector.",
+            ),
+            key(
+                "exact",
+                Special("a number or an expression; for a vector an array of one per axis"),
+                Required,
+                "Exact value, of X, Y, Z, x, y, z, s, t.",
+            ),
+            key(
+                "norm",
+                Choice(VerifyNorm::NAMES),
+                Default("\"volume-l1\""),
+                "Lagrangian eq. 42, its quadratic form, or the largest error.",
+            ),
+            key("scale", Number, Default("1.0"), "Divides the error.").range(POSITIVE),
+        ],
+    },
+    Section {
+        name: "output",
+        header: "[output]",
+        doc: "What is written, and when.",
+        keys: &[
+            key(
+                "every",
+                Special("a whole number of steps, or { seconds = s }"),
+                Default("1"),
+                "Interval between outputs.",
+            ),
+            key(
+                "fields",
+                Choices(FIELD_NAMES),
+                Default("[\"displacement\", \"stress\", \"plastic_strain\"]"),
+                "Point fields.",
+            ),
+            key("checkpoint", Table("output.checkpoint"), Optional("none"), "Checkpoints."),
+        ],
+    },
+    Section {
+        name: "output.every",
+        header: "output.every",
+        doc: "An interval of time instead of steps.",
+        keys: &[key("seconds", Number, Required, "Simulated time between outputs.")
+            .unit("s")
+            .range(POSITIVE)],
+    },
+    Section {
+        name: "output.checkpoint",
+        header: "output.checkpoint",
+        doc: "At least one of the two intervals.",
+        keys: &[
+            key("every", Count, Optional("or minutes"), "Steps between checkpoints.")
+                .range(at_least(1.0)),
+            key("minutes", Number, Optional("or every"), "Wall time between checkpoints.")
+                .unit("min")
+                .range(POSITIVE),
+            key("keep", Count, Default("2"), "How many to keep.").range(at_least(1.0)),
+        ],
+    },
+    Section {
+        name: "parallel",
+        header: "[parallel]",
+        doc: "Distribution over ranks. The results do not depend on it.",
+        keys: &[
+            key(
+                "brick",
+                Count,
+                Optional("chosen by size"),
+                "Cells per side of a lattice brick, the unit of partition.",
+            )
+            .range(at_least(1.0)),
+            key(
+                "rebalance_above",
+                Number,
+                Default("1.2"),
+                "Repartition when the largest cost exceeds this times the mean; 0: never.",
+            )
+            .range(at_least(0.0)),
+        ],
+    },
+    Section {
+        name: "conditioning",
+        header: "[conditioning]",
+        doc: "With analysis.type = \"conditioning\": rigid motion in `steps` increments, nothing solved.",
+        keys: &[key("displacement", Vector, Required, "Total motion.").unit("m")],
+    },
+];

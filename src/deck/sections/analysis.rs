@@ -1,0 +1,196 @@
+//! `[analysis]`, `[method]`, `[ghost]`, `[conditioning]`.
+
+use crate::deck::model::{Analysis, AnalysisType, Basis, Ghost, Method};
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+use crate::deck::schema::between;
+use crate::deck::tree::Value;
+
+pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
+    let kind: Got<AnalysisType> = table.choice("type");
+    let steps = table.count_if("steps");
+    let duration = table.number_if("duration");
+    let cfl = table.number_if("cfl");
+    let tolerance = table.number("tolerance");
+    let max_iterations = table.count("max_iterations");
+    let on_failure = table.choice("on_failure");
+    let smallest_step = table.number("smallest_step");
+    let inverted_iterates = table.choice("inverted_iterates");
+    let newmark = (table.number("newmark_beta"), table.number("newmark_gamma"));
+    let hht_alpha = table.number("hht_alpha");
+    let kind = kind?;
+    let timing = timing(table, kind);
+    let (newmark_beta, newmark_gamma, hht_alpha) = (newmark.0?, newmark.1?, hht_alpha?);
+    let (newmark_beta, newmark_gamma) = if hht_alpha == 0.0 {
+        stable_newmark(table, newmark_beta, newmark_gamma)?;
+        (newmark_beta, newmark_gamma)
+    } else {
+        let set = ((1.0 - hht_alpha).powi(2) / 4.0, (1.0 - 2.0 * hht_alpha) / 2.0);
+        for (key, given, wanted) in
+            [("newmark_beta", newmark_beta, set.0), ("newmark_gamma", newmark_gamma, set.1)]
+        {
+            if table.given(key) && given != wanted {
+                return Err(table.problem(
+                    key,
+                    format!("hht_alpha = {hht_alpha} sets it to {wanted}; leave one of them out"),
+                ));
+            }
+        }
+        set
+    };
+    timing?;
+    Ok(Analysis {
+        kind,
+        steps: steps?,
+        duration: duration?,
+        cfl: cfl?,
+        tolerance: tolerance?,
+        max_iterations: max_iterations?,
+        on_failure: on_failure?,
+        smallest_step: smallest_step?,
+        inverted_iterates: inverted_iterates?,
+        newmark_beta,
+        newmark_gamma,
+        hht_alpha,
+    })
+}
+
+/// Which of steps, duration and cfl the kind of analysis takes.
+fn timing(table: &Table<'_>, kind: AnalysisType) -> Got<()> {
+    let dynamic = matches!(kind, AnalysisType::Explicit | AnalysisType::ImplicitDynamic);
+    let name = kind.name();
+    let mut result = Ok(());
+    if dynamic && !table.given("duration") {
+        result = Err(table.missing("duration", &format!("type = \"{name}\" needs it")));
+    }
+    if !dynamic {
+        let why = format!("type = \"{name}\" has no time; steps alone count");
+        result = result.and(table.refuse(&["duration", "cfl"], &why));
+    }
+    if kind == AnalysisType::ImplicitDynamic {
+        result =
+            result.and(table.refuse(&["cfl"], "only type = \"explicit\" takes it; give steps"));
+    }
+    if kind == AnalysisType::Explicit && table.given("cfl") {
+        let why = "steps and cfl exclude each other: give the number of steps, or the fraction of the stability limit";
+        return result.and(table.refuse(&["steps"], why));
+    }
+    if !table.given("steps") {
+        let or = if kind == AnalysisType::Explicit { "or give cfl" } else { "" };
+        result = result.and(Err(table.missing("steps", or)));
+    }
+    result
+}
+
+fn stable_newmark(table: &Table<'_>, beta: f64, gamma: f64) -> Got<()> {
+    let least = (gamma + 0.5).powi(2) / 4.0;
+    if beta < least * (1.0 - 1e-12) {
+        return Err(table.problem(
+            "newmark_beta",
+            format!("expected at least (gamma + 1/2)^2 / 4 = {least}, for stability, found {beta}"),
+        ));
+    }
+    Ok(())
+}
+
+/// `ghost`: the section as read, if that succeeded.
+pub fn method(table: &Table<'_>, ghost: Option<&Option<Ghost>>) -> Got<Method> {
+    let basis: Got<Basis> = table.choice("basis");
+    let domain_update = table.choice("domain_update");
+    let frame = table.choice("frame");
+    let mass = table.choice("mass");
+    let stress_update = table.choice("stress_update");
+    let velocity = velocity_update(table);
+    let order = table.count_if("xpic_order");
+    let drop_below = table.number_if("drop_below");
+    let (flip, xpic) = velocity?;
+    let order = order?;
+    if order.is_some() && !xpic {
+        return Err(table.problem("xpic_order", "only with velocity_update = \"xpic\""));
+    }
+    let stiffened = ghost.and_then(Option::as_ref).is_some_and(|ghost| {
+        ghost.stiffness.or(ghost.stiffness_factor).is_some_and(|value| value > 0.0)
+    });
+    Ok(Method {
+        basis: basis?,
+        domain_update: domain_update?,
+        frame: frame?,
+        mass: mass?,
+        stress_update: stress_update?,
+        flip,
+        xpic: xpic.then(|| order.unwrap_or(2)),
+        drop_below: drop_below?.unwrap_or(if stiffened { 0.0 } else { 1e-8 }),
+    })
+}
+
+/// FLIP share, and whether it is XPIC.
+fn velocity_update(table: &Table<'_>) -> Got<(f64, bool)> {
+    let Some(node) = table.node("velocity_update") else { return Ok((1.0, false)) };
+    match &node.value {
+        Value::String(word) => match word.as_str() {
+            "flip" => Ok((1.0, false)),
+            "pic" => Ok((0.0, false)),
+            "xpic" => Ok((0.0, true)),
+            _ => Err(table.unknown_word(
+                "velocity_update",
+                word,
+                &["flip", "pic", "xpic"],
+                &node.origin,
+            )),
+        },
+        _ => Ok((table.number_from("velocity_update", node, between(0.0, 1.0))?, false)),
+    }
+}
+
+pub fn ghost(table: &Table<'_>) -> Got<Ghost> {
+    let stiffness = table.number_if("stiffness");
+    let stiffness_factor = table.number_if("stiffness_factor");
+    let mass = table.number_if("mass");
+    let mass_factor = table.number_if("mass_factor");
+    let scaling = table.choice("scaling");
+    for (value, factor) in [("stiffness", "stiffness_factor"), ("mass", "mass_factor")] {
+        if table.given(value) {
+            table.refuse(&[factor], &format!("{value} is given too; leave one of them out"))?;
+        }
+    }
+    let keys = ["stiffness", "stiffness_factor", "mass", "mass_factor"];
+    if !keys.iter().any(|key| table.given(key)) {
+        let message =
+            "expected a stiffness or a mass: stiffness, stiffness_factor, mass or mass_factor";
+        return Err(table.problem_with_help(
+            "",
+            message,
+            "without [ghost] the stabilisation is off",
+        ));
+    }
+    Ok(Ghost {
+        stiffness: stiffness?,
+        stiffness_factor: stiffness_factor?,
+        mass: mass?,
+        mass_factor: mass_factor?,
+        scaling: scaling?,
+    })
+}
+
+/// The rigid motion of a conditioning study, for such an analysis only.
+pub fn conditioning(
+    root: &Table<'_>,
+    analysis: Option<&Analysis>,
+    dimension: usize,
+) -> Got<Option<Vec<f64>>> {
+    let motion = root.table_if("conditioning", |table| table.vector("displacement", dimension))?;
+    let Some(analysis) = analysis else { return Ok(motion) };
+    match (analysis.kind == AnalysisType::Conditioning, &motion) {
+        (true, None) => {
+            Err(root.missing("conditioning", "analysis.type = \"conditioning\" needs it"))
+        }
+        (false, Some(_)) => Err(root.problem(
+            "conditioning",
+            format!(
+                "only for analysis.type = \"conditioning\", found \"{}\"",
+                analysis.kind.name()
+            ),
+        )),
+        _ => Ok(motion),
+    }
+}

@@ -1,0 +1,229 @@
+//! `[material.NAME]` and `[[body]]`.
+
+use std::path::Path;
+
+use super::shapes;
+use crate::deck::expression::Expression;
+use crate::deck::model::{
+    Analysis, AnalysisType, Basis, Body, BodySource, Grid, LatticeGrid, Material, MaterialModel,
+    MeshMotion, MeshSource, Method, Seeding,
+};
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+use crate::deck::schema::AXES;
+use crate::deck::tree::Value;
+
+/// What bodies and conditions are judged against; parts that could not be read are absent.
+pub struct World<'a> {
+    pub dimension: usize,
+    pub directory: &'a Path,
+    pub grid: &'a Grid,
+    pub analysis: Option<&'a Analysis>,
+    pub method: Option<&'a Method>,
+}
+
+pub fn materials(root: &Table<'_>) -> Got<Vec<Material>> {
+    let materials = root.named("material", |name, table| {
+        let model = table.choice_of("model", &["hencky", "von-mises"]);
+        let (young, poisson) = (table.number("young"), table.number("poisson"));
+        let yield_stress = table.number_if("yield");
+        let model = if model? == 0 {
+            table.refuse(&["yield"], "only for model = \"von-mises\"")?;
+            MaterialModel::Hencky { young: young?, poisson: poisson? }
+        } else {
+            let yield_stress = yield_stress?
+                .ok_or_else(|| table.missing("yield", "model = \"von-mises\" needs it"));
+            MaterialModel::VonMises {
+                young: young?,
+                poisson: poisson?,
+                yield_stress: yield_stress?,
+            }
+        };
+        Ok(Material { name: name.to_string(), model })
+    })?;
+    if materials.is_empty() {
+        return Err(root.missing("material", "expected a [material.NAME]"));
+    }
+    Ok(materials)
+}
+
+/// Names of the materials as written, whether or not they are right.
+fn material_names(root: &Table<'_>) -> Vec<String> {
+    match root.node("material").map(|node| &node.value) {
+        Some(Value::Table(entries)) => entries.iter().map(|entry| entry.key.clone()).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Names of the bodies as written, so that other sections can refer to faulty ones.
+pub fn names(root: &Table<'_>) -> Vec<String> {
+    let Some(Value::Array(items)) = root.node("body").map(|node| &node.value) else {
+        return Vec::new();
+    };
+    let name_of = |(index, node): (usize, &crate::deck::tree::Node)| {
+        let Value::Table(entries) = &node.value else { return default_name(index) };
+        match entries.iter().find(|entry| entry.key == "name").map(|entry| &entry.node.value) {
+            Some(Value::String(name)) => name.clone(),
+            _ => default_name(index),
+        }
+    };
+    items.iter().enumerate().map(name_of).collect()
+}
+
+fn default_name(index: usize) -> String {
+    format!("body-{}", index + 1)
+}
+
+pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
+    let (materials, names) = (material_names(root), names(root));
+    let bodies = root.tables("body", |index, table| {
+        if names[..index].contains(&names[index]) {
+            table.problem("name", format!("another body is called \"{}\"", names[index]));
+        }
+        let material = material(&table, &materials);
+        let density = density(&table, world);
+        let velocity = table.expressions_if("velocity", world.dimension);
+        let source = table.table("shape", |shape| source(&table, &shape, world));
+        let rest = || vec![Expression::constant(0.0); world.dimension];
+        Ok(Body {
+            name: names[index].clone(),
+            material: material?,
+            density: density?,
+            source: source?,
+            velocity: velocity?.unwrap_or_else(rest),
+        })
+    })?;
+    if bodies.is_empty() {
+        return Err(root.missing("body", "expected a [[body]]"));
+    }
+    Ok(bodies)
+}
+
+fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {
+    let name = table.text("material")?;
+    let known: Vec<&str> = materials.iter().map(String::as_str).collect();
+    known
+        .iter()
+        .position(|material| *material == name)
+        .ok_or_else(|| table.unknown_word("material", &name, &known, table.origin("material")))
+}
+
+fn density(table: &Table<'_>, world: &World<'_>) -> Got<f64> {
+    let density = table.number_if("density")?.unwrap_or(0.0);
+    if let Some(kind) = world.analysis.map(|analysis| analysis.kind)
+        && kind != AnalysisType::QuasiStatic
+        && density <= 0.0
+    {
+        let message = format!("expected > 0 kg/m3: analysis.type = \"{}\" needs mass", kind.name());
+        return Err(table.problem("density", message));
+    }
+    Ok(density)
+}
+
+fn source(body: &Table<'_>, shape: &Table<'_>, world: &World<'_>) -> Got<BodySource> {
+    let seeds = ["points_per_cell", "lattice", "gauss"];
+    let placed = ["rotate", "translate"];
+    if shape.given("points") {
+        shape.refuse(&shapes::FORMS, "points come from a file; leave one of them out")?;
+        shape.refuse(&["cells"], "points come from a file; leave one of them out")?;
+        shape.refuse(&placed, "points of a file stay where they are")?;
+        body.refuse(&seeds, "points come from a file")?;
+        return Ok(BodySource::File(world.directory.join(shape.text("points")?)));
+    }
+    if shape.given("cells") {
+        shape.refuse(&shapes::FORMS, "cells of the mesh are given; leave one of them out")?;
+        shape.refuse(&placed, "cells of the mesh stay where they are")?;
+        body.refuse(&["lattice"], "cells of the mesh are filled with points_per_cell or gauss")?;
+        if matches!(world.grid, Grid::Lattice(_)) {
+            return Err(shape.problem("cells", "only for grid.type = \"mesh\""));
+        }
+        let tag = shape.text("cells")?;
+        let tag = (tag != "all").then_some(tag);
+        return Ok(BodySource::MeshCells { tag, seeding: seeding(body, world)? });
+    }
+    let form = shapes::shape(shape, world.dimension, 0);
+    let seeding = seeding(body, world);
+    let form = form?;
+    if let (Some((low, high)), Some((min, max))) = (form.bounds(), grid_bounds(world.grid)) {
+        for axis in 0..world.dimension {
+            if high[axis] < min[axis] || low[axis] > max[axis] {
+                return Err(shape.problem(
+                    "",
+                    format!(
+                        "the body lies outside the grid: {} from {} to {} m, the grid from {} to {} m",
+                        AXES[axis], low[axis], high[axis], min[axis], max[axis]
+                    ),
+                ));
+            }
+        }
+    }
+    Ok(BodySource::Shape { shape: form, seeding: seeding? })
+}
+
+/// Lower and upper corner, where the deck tells them.
+fn grid_bounds(grid: &Grid) -> Option<(Vec<f64>, Vec<f64>)> {
+    match grid {
+        Grid::Lattice(LatticeGrid { origin, spacing, cells }) => {
+            let ends = (0..origin.len()).map(|a| origin[a] + spacing[a] * cells[a] as f64);
+            Some((origin.clone(), ends.collect()))
+        }
+        Grid::Mesh(mesh) => match &mesh.source {
+            MeshSource::File(_) => None,
+            MeshSource::Annulus { outer, .. } => Some((vec![-outer; 2], vec![*outer; 2])),
+            MeshSource::Box { min, max, .. } => Some((min.clone(), max.clone())),
+        },
+    }
+}
+
+fn seeding(table: &Table<'_>, world: &World<'_>) -> Got<Seeding> {
+    let dimension = world.dimension;
+    let given: Vec<&'static str> = ["points_per_cell", "lattice", "gauss"]
+        .into_iter()
+        .filter(|key| table.given(key))
+        .collect();
+    if given.is_empty() {
+        return Ok(Seeding::PerCell(vec![2; dimension]));
+    }
+    match table.one_of(&["points_per_cell", "lattice", "gauss"])? {
+        "points_per_cell" => {
+            let counts = table.counts_if("points_per_cell", dimension)?;
+            Ok(Seeding::PerCell(counts.unwrap_or_else(|| vec![2; dimension])))
+        }
+        "lattice" => {
+            let (spacing, offset) = table.table("lattice", |lattice| {
+                let spacing = lattice.number("spacing");
+                let offset = lattice.vector_if("offset", dimension);
+                let (spacing, offset) = (spacing?, offset?);
+                domain_fits(&lattice, spacing, world)?;
+                Ok((spacing, offset.unwrap_or_else(|| vec![0.0; dimension])))
+            })?;
+            Ok(Seeding::Lattice { spacing, offset })
+        }
+        _ => {
+            let count = table.count("gauss")?;
+            let follows = matches!(world.grid, Grid::Mesh(m) if m.motion == MeshMotion::Material);
+            if !follows || world.method.is_some_and(|method| method.basis != Basis::Mpm) {
+                return Err(table.problem(
+                    "gauss",
+                    "Gauss points are finite elements: they need grid.motion = { follow = \"material\" } and method.basis = \"mpm\"",
+                ));
+            }
+            Ok(Seeding::Gauss(count))
+        }
+    }
+}
+
+/// A GIMP domain (as wide as the spacing of its lattice) may not be wider than a cell.
+fn domain_fits(lattice: &Table<'_>, spacing: f64, world: &World<'_>) -> Got<()> {
+    let (Grid::Lattice(grid), Some(method)) = (world.grid, world.method) else { return Ok(()) };
+    let smallest = grid.spacing.iter().copied().fold(f64::INFINITY, f64::min);
+    if method.basis == Basis::Gimp && spacing > smallest * (1.0 + 1e-12) {
+        return Err(lattice.problem(
+            "spacing",
+            format!(
+                "expected at most the cell size {smallest} m: with basis = \"gimp\" a domain may not be larger than a cell, found {spacing} m"
+            ),
+        ));
+    }
+    Ok(())
+}

@@ -1,0 +1,84 @@
+//! Values of each section, and the checks across sections.
+//!
+//! | file | sections |
+//! |---|---|
+//! | `analysis.rs` | analysis, method, ghost, conditioning |
+//! | `grid.rs` | grid |
+//! | `bodies.rs` | material, body |
+//! | `shapes.rs` | body.shape |
+//! | `conditions.rs` | boundary, load |
+//! | `restraint.rs` | whether rigid motion is held |
+//! | `results.rs` | verify, output, parallel, petsc |
+
+mod analysis;
+mod bodies;
+mod conditions;
+mod grid;
+mod restraint;
+mod results;
+mod shapes;
+
+use std::path::Path;
+
+use super::model::Deck;
+use super::problems::{Got, Problems};
+use super::reader::Table;
+use super::schema;
+use super::tree::Node;
+
+/// Reads the whole deck; goes on after a problem as long as what follows can be judged.
+pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck> {
+    let root = Table::open(problems, schema::section(""), "", root)?;
+    let title = root.text("title");
+    let analysis = root.table("analysis", |table| analysis::analysis(&table));
+    let ghost = root.table_if("ghost", |table| analysis::ghost(&table));
+    let method =
+        root.table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok()));
+    let materials = bodies::materials(&root);
+    let output = root.table_or_default("output", |table| results::output(&table));
+    let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
+    let petsc = results::petsc(&root);
+    // Without the grid the dimension is unknown, and nothing below can be judged.
+    let (grid, dimension) = root.table("grid", |table| grid::grid(&table, directory))?;
+    let conditioning = analysis::conditioning(&root, analysis.as_ref().ok(), dimension);
+    let world = bodies::World {
+        dimension,
+        directory,
+        grid: &grid,
+        analysis: analysis.as_ref().ok(),
+        method: method.as_ref().ok(),
+    };
+    let bodies = bodies::bodies(&root, &world);
+    let names = bodies::names(&root);
+    let boundaries = conditions::boundaries(&root, &world, &names);
+    let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
+    let verify = results::verify(&root, dimension);
+    if let (Ok(method), Ok(boundaries)) = (&method, &boundaries) {
+        let grid_problems = root.table("grid", |table| {
+            grid::check_basis(&table, &grid, method)?;
+            grid::check_motion(&table, &grid, boundaries)
+        });
+        grid_problems?;
+    }
+    if let (Ok(analysis), Ok(boundaries)) = (&analysis, &boundaries) {
+        restraint::check(&root, analysis, boundaries, dimension)?;
+    }
+    Ok(Deck {
+        title: title?,
+        dimension,
+        directory: directory.to_path_buf(),
+        analysis: analysis?,
+        method: method?,
+        ghost: ghost?,
+        materials: materials?,
+        bodies: bodies?,
+        boundaries: boundaries?,
+        loads: loads?,
+        verify: verify?,
+        output: output?,
+        parallel: parallel?,
+        conditioning_displacement: conditioning?,
+        petsc: petsc?,
+        grid,
+    })
+}

@@ -1,0 +1,44 @@
+//! Whether boundary conditions hold the bodies: a quasi-static system without them is singular.
+
+use crate::deck::model::{Analysis, AnalysisType, Boundary};
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+use crate::deck::schema::AXES;
+use crate::deck::tree::Origin;
+
+/// Reports an axis along which nothing is prescribed in a quasi-static analysis.
+pub fn check(
+    root: &Table<'_>,
+    analysis: &Analysis,
+    boundaries: &[Boundary],
+    dimension: usize,
+) -> Got<()> {
+    if analysis.kind != AnalysisType::QuasiStatic {
+        return Ok(());
+    }
+    let held = |axis: usize| {
+        boundaries.iter().any(|boundary| {
+            boundary.fix.contains(&axis)
+                || boundary.displacement.iter().any(|(component, _)| *component == axis)
+                || (boundary.rotation.is_some() && axis < 2)
+        })
+    };
+    let free: Vec<&str> =
+        (0..dimension).filter(|axis| !held(*axis)).map(|axis| AXES[axis]).collect();
+    if free.is_empty() {
+        return Ok(());
+    }
+    let message = if boundaries.is_empty() {
+        "no [[boundary]]: nothing holds the bodies, so that the quasi-static system is singular (any rigid motion solves it)".to_string()
+    } else {
+        format!(
+            "no [[boundary]] holds {}: the bodies can move rigidly along it, so that the quasi-static system is singular",
+            free.join(" and ")
+        )
+    };
+    let help = format!(
+        "for example: where = {{ side = \"left\" }}, fix = [{}]",
+        free.iter().map(|axis| format!("\"{axis}\"")).collect::<Vec<_>>().join(", ")
+    );
+    Err(root.problems().report(&Origin::Nowhere, "boundary", message, help))
+}

@@ -1,0 +1,151 @@
+//! `[[verify]]`, `[output]`, `[parallel]`, `[petsc]`.
+
+use crate::deck::expression::Expression;
+use crate::deck::fields::{FIELD_NAMES, FIELDS, FieldRank, TENSOR_COMPONENTS};
+use crate::deck::model::{Checkpoint, Every, Output, Parallel, Verify};
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+use crate::deck::schema::{self, AXES, at_least};
+use crate::deck::tree::Value;
+
+pub fn verify(root: &Table<'_>, dimension: usize) -> Got<Vec<Verify>> {
+    let mut names: Vec<String> = Vec::new();
+    root.tables("verify", |_, table| {
+        let name = table.text("name");
+        let components = components(&table, dimension);
+        let norm = table.choice("norm");
+        let scale = table.number("scale");
+        let (field, components) = components?;
+        let exact = exact(&table, &field, components);
+        let name = name?;
+        if names.contains(&name) {
+            let message = format!("another figure of merit is called \"{name}\"");
+            return Err(table.problem("name", message));
+        }
+        names.push(name.clone());
+        Ok(Verify { name, field, exact: exact?, norm: norm?, scale: scale? })
+    })
+}
+
+/// The field and how many components are compared.
+fn components(table: &Table<'_>, dimension: usize) -> Got<(String, usize)> {
+    let field = table.text("field")?;
+    let (base, component) = match field.split_once('.') {
+        Some((base, component)) => (base, Some(component)),
+        None => (field.as_str(), None),
+    };
+    let unknown = |word: &str, known: &[&str]| {
+        Err(table.unknown_word("field", word, known, table.origin("field")))
+    };
+    let Some((_, rank)) = FIELDS.iter().find(|(name, _)| *name == base) else {
+        return unknown(&field, FIELD_NAMES);
+    };
+    let known: Vec<String> = match rank {
+        FieldRank::Scalar => vec![base.to_string()],
+        FieldRank::Vector => AXES[..dimension].iter().map(|c| format!("{base}.{c}")).collect(),
+        FieldRank::Tensor => TENSOR_COMPONENTS.iter().map(|c| format!("{base}.{c}")).collect(),
+    };
+    match (rank, component) {
+        (FieldRank::Vector, None) => Ok((field, dimension)),
+        _ if known.contains(&field) => Ok((field, 1)),
+        _ => unknown(&field, &known.iter().map(String::as_str).collect::<Vec<_>>()),
+    }
+}
+
+fn exact(table: &Table<'_>, field: &str, components: usize) -> Got<Vec<Expression>> {
+    let Some(node) = table.node("exact") else { return Err(table.missing("exact", "")) };
+    let found = match &node.value {
+        Value::Array(items) => items.len(),
+        _ => 1,
+    };
+    if found != components {
+        let message = format!("\"{field}\" has {components} component(s), found {found} value(s)");
+        return Err(table.problem("exact", message));
+    }
+    match &node.value {
+        Value::Array(_) => table.expressions_if("exact", components).map(Option::unwrap_or_default),
+        _ => Ok(table.expression_if("exact")?.into_iter().collect()),
+    }
+}
+
+pub fn output(table: &Table<'_>) -> Got<Output> {
+    let every = every(table);
+    let fields = table.choices("fields", FIELD_NAMES);
+    let checkpoint = table.table_if("checkpoint", |t| {
+        let (every, minutes, keep) = (t.count_if("every"), t.number_if("minutes"), t.count("keep"));
+        if !t.given("every") && !t.given("minutes") {
+            return Err(
+                t.problem("", "expected \"every\" (steps), \"minutes\" (wall time) or both")
+            );
+        }
+        Ok(Checkpoint { every: every?, minutes: minutes?, keep: keep? })
+    });
+    let fields = fields?.into_iter().map(|at| FIELD_NAMES[at].to_string()).collect();
+    Ok(Output { every: every?, fields, checkpoint: checkpoint? })
+}
+
+fn every(table: &Table<'_>) -> Got<Every> {
+    let Some(node) = table.node("every") else { return Ok(Every::Steps(1)) };
+    match &node.value {
+        Value::Table(_) => {
+            let path = table.full("every");
+            let section = schema::section("output.every");
+            let time = Table::open(table.problems(), section, &path, node)?;
+            Ok(Every::Seconds(time.number("seconds")?))
+        }
+        Value::Integer(_) => {
+            let steps = table.number_from("every", node, at_least(1.0))?;
+            Ok(Every::Steps(steps as usize))
+        }
+        _ => Err(table.wrong("every", node)),
+    }
+}
+
+pub fn parallel(table: &Table<'_>) -> Got<Parallel> {
+    let (brick, above) = (table.count_if("brick"), table.number("rebalance_above"));
+    let above = above?;
+    if above != 0.0 && above < 1.0 {
+        return Err(table.problem(
+            "rebalance_above",
+            format!("expected 0 (never) or a number >= 1, found {above}"),
+        ));
+    }
+    Ok(Parallel { brick: brick?, rebalance_above: above })
+}
+
+/// Option names without a dash, with their values as PETSc reads them.
+pub fn petsc(root: &Table<'_>) -> Got<Vec<(String, String)>> {
+    let Some(node) = root.node("petsc") else { return Ok(Vec::new()) };
+    let Value::Table(entries) = &node.value else { return Err(root.wrong("petsc", node)) };
+    let options: Vec<Got<(String, String)>> = entries
+        .iter()
+        .map(|entry| {
+            let key = format!("petsc.{}", entry.key);
+            let report = |message: String| {
+                root.problems().report(&entry.node.origin, &key, message, String::new())
+            };
+            let name = entry.key.trim_start_matches('-').to_string();
+            if name.is_empty() || name.contains(char::is_whitespace) {
+                return Err(report("expected the name of a PETSc option".to_string()));
+            }
+            let value = match &entry.node.value {
+                Value::String(text) if text.chars().any(|c| c == '\n' || c == '"') => {
+                    return Err(report("expected one line without quotes".to_string()));
+                }
+                Value::String(text) => text.clone(),
+                Value::Boolean(true) => String::new(),
+                Value::Boolean(false) => "false".to_string(),
+                Value::Integer(number) => number.to_string(),
+                Value::Float(number) => format!("{number:?}"),
+                _ => {
+                    let found = entry.node.describe();
+                    return Err(report(format!(
+                        "expected a string, number or true, found {found}"
+                    )));
+                }
+            };
+            Ok((name, value))
+        })
+        .collect();
+    options.into_iter().collect()
+}

@@ -1,0 +1,153 @@
+//! `body.shape`: forms and where they are put.
+
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+use crate::deck::schema;
+use crate::deck::shape::{Form, Placement, Shape, Turn};
+use crate::deck::tree::Value;
+
+/// Keys of the forms; the sources `points` and `cells` are a body's own.
+pub const FORMS: [&str; 11] = [
+    "box",
+    "disc",
+    "ball",
+    "ellipse",
+    "ellipsoid",
+    "capsule",
+    "polygon",
+    "where",
+    "union",
+    "intersection",
+    "difference",
+];
+
+/// Sets of sets deeper than this are refused.
+const DEEPEST: usize = 32;
+
+pub fn shape(table: &Table<'_>, dimension: usize, depth: usize) -> Got<Shape> {
+    if depth > DEEPEST {
+        return Err(table.problem("", format!("shapes are nested more than {DEEPEST} deep")));
+    }
+    if depth > 0 {
+        table.refuse(&["points", "cells"], "only directly in a body")?;
+    }
+    let name = table.one_of(&FORMS)?;
+    let form = form(table, name, dimension, depth);
+    let placement = placement(table, dimension);
+    Ok(Shape { form: form?, placement: placement? })
+}
+
+fn form(table: &Table<'_>, name: &'static str, dimension: usize, depth: usize) -> Got<Form> {
+    match name {
+        "box" => table.table(name, |t| {
+            let (min, max) = corners(&t, dimension, false)?;
+            Ok(Form::Box { min, max })
+        }),
+        "disc" | "ball" => table.table(name, |t| {
+            let (centre, radius) = (t.vector("centre", dimension), t.number("radius"));
+            Ok(Form::Ball { centre: centre?, radius: radius? })
+        }),
+        "ellipse" | "ellipsoid" => table.table(name, |t| {
+            let (centre, axes) = (t.vector("centre", dimension), t.vector("semi_axes", dimension));
+            Ok(Form::Ellipsoid { centre: centre?, semi_axes: axes? })
+        }),
+        "capsule" => table.table(name, |t| {
+            let (from, to) = (t.vector("from", dimension), t.vector("to", dimension));
+            let radius = t.number("radius");
+            Ok(Form::Capsule { from: from?, to: to?, radius: radius? })
+        }),
+        "polygon" => polygon(table, dimension),
+        "where" => {
+            let variables = if dimension == 2 { "x y X Y" } else { "x y z X Y Z" };
+            let condition = table.formula("where", variables)?;
+            match condition.as_constant() {
+                None => Ok(Form::Where(condition)),
+                Some(_) => Err(table.problem(
+                    "where",
+                    "expected a condition on x and y, such as \"x*x + y < 1\", found a constant",
+                )),
+            }
+        }
+        "union" => Ok(Form::Union(shapes(table, name, dimension, depth)?)),
+        "intersection" => Ok(Form::Intersection(shapes(table, name, dimension, depth)?)),
+        _ => Ok(Form::Difference(shapes(table, name, dimension, depth)?)),
+    }
+}
+
+/// `min` and `max`; equal only if `flat` is allowed.
+pub fn corners(table: &Table<'_>, dimension: usize, flat: bool) -> Got<(Vec<f64>, Vec<f64>)> {
+    let (min, max) = (table.vector("min", dimension), table.vector("max", dimension));
+    let (min, max) = (min?, max?);
+    for axis in 0..dimension {
+        if max[axis] < min[axis] || (max[axis] == min[axis] && !flat) {
+            let relation = if flat { "at least" } else { "more than" };
+            return Err(table.problem(
+                "max",
+                format!(
+                    "expected {relation} min = {} along {}, found {}",
+                    min[axis],
+                    schema::AXES[axis],
+                    max[axis]
+                ),
+            ));
+        }
+    }
+    Ok((min, max))
+}
+
+fn polygon(table: &Table<'_>, dimension: usize) -> Got<Form> {
+    if dimension != 2 {
+        return Err(table.problem("polygon", "polygons are 2D; the grid is 3D"));
+    }
+    table.table("polygon", |t| {
+        let vertices = t.points("vertices", 2)?;
+        if vertices.len() < 3 {
+            let message = format!("expected 3 or more corners, found {}", vertices.len());
+            return Err(t.problem("vertices", message));
+        }
+        Ok(Form::Polygon { vertices: vertices.iter().map(|v| [v[0], v[1]]).collect() })
+    })
+}
+
+fn shapes(
+    table: &Table<'_>,
+    name: &'static str,
+    dimension: usize,
+    depth: usize,
+) -> Got<Vec<Shape>> {
+    let Some(node) = table.node(name) else { return Err(table.missing(name, "")) };
+    let Value::Array(items) = &node.value else { return Err(table.wrong(name, node)) };
+    let least = if name == "difference" { 2 } else { 1 };
+    if items.len() < least {
+        let message = format!("expected {least} or more shapes, found {}", items.len());
+        return Err(table.problem(name, message));
+    }
+    let all: Vec<Got<Shape>> = items
+        .iter()
+        .enumerate()
+        .map(|(index, item)| {
+            let path = format!("{}.{index}", table.full(name));
+            let part = Table::open(table.problems(), schema::section("shape"), &path, item)?;
+            shape(&part, dimension, depth + 1)
+        })
+        .collect();
+    all.into_iter().collect()
+}
+
+fn placement(table: &Table<'_>, dimension: usize) -> Got<Placement> {
+    let translate = table.vector_if("translate", dimension);
+    let rotate = table.table_if("rotate", |t| {
+        let degrees = t.number("degrees");
+        let about = t.vector_if("about", dimension);
+        if dimension == 2 {
+            t.refuse(&["axis"], "only in 3D")?;
+        }
+        let axis = t.vector_if("axis", 3)?.map_or([0.0, 0.0, 1.0], |a| [a[0], a[1], a[2]]);
+        if axis == [0.0; 3] {
+            return Err(t.problem("axis", "expected a direction, found zeros"));
+        }
+        let about = about?.unwrap_or_else(|| vec![0.0; dimension]);
+        Ok(Turn { degrees: degrees?, about, axis })
+    });
+    Ok(Placement { translate: translate?.unwrap_or_default(), rotate: rotate? })
+}

@@ -1,0 +1,57 @@
+//! The deck's own words for the enumerations of the model.
+
+use super::model::{
+    AnalysisType, Basis, DomainUpdate, Element, Frame, GhostScaling, InvertedIterates, Mass,
+    OnFailure, StressUpdate, VerifyNorm,
+};
+
+/// An enumeration that the deck spells in words.
+pub trait Words: Copy + PartialEq + 'static {
+    /// Every word with its value, in the order of the documentation.
+    const WORDS: &'static [(&'static str, Self)];
+}
+
+macro_rules! words {
+    ($( $type:ident { $( $word:literal => $variant:ident ),* $(,)? } )*) => { $(
+        impl Words for $type {
+            const WORDS: &'static [(&'static str, Self)] = &[ $( ($word, $type::$variant) ),* ];
+        }
+
+        impl $type {
+            /// All words of the deck for this choice.
+            pub const NAMES: &'static [&'static str] = &[ $( $word ),* ];
+
+            /// The deck's word.
+            pub fn name(self) -> &'static str {
+                match self { $( $type::$variant => $word ),* }
+            }
+        }
+    )* };
+}
+
+words! {
+    AnalysisType {
+        "quasi-static" => QuasiStatic,
+        "explicit" => Explicit,
+        "implicit-dynamic" => ImplicitDynamic,
+        "conditioning" => Conditioning,
+    }
+    OnFailure { "stop" => Stop, "cut" => Cut }
+    InvertedIterates { "reject" => Reject, "allow" => Allow }
+    Basis { "mpm" => Mpm, "gimp" => Gimp, "cpdi1" => Cpdi1, "cpdi2" => Cpdi2 }
+    DomainUpdate {
+        "none" => None,
+        "det" => Det,
+        "normal" => Normal,
+        "stretch" => Stretch,
+        "corners" => Corners,
+        "normal-corrected" => NormalCorrected,
+        "normal-incremental" => NormalIncremental,
+    }
+    Frame { "previous" => Previous, "updated" => Updated, "total" => Total }
+    Mass { "consistent" => Consistent, "lumped" => Lumped }
+    StressUpdate { "usf" => Usf, "usl" => Usl, "musl" => Musl }
+    GhostScaling { "scale-free" => ScaleFree, "literal" => Literal, "published" => Published }
+    Element { "quad4" => Quad4, "tri3" => Tri3, "hex8" => Hex8, "tet4" => Tet4 }
+    VerifyNorm { "volume-l1" => VolumeL1, "volume-l2" => VolumeL2, "max" => Max }
+}
