@@ -1,0 +1,46 @@
+# Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
+.PHONY: help setup build run test bench docs validate lint clean
+
+RANKS ?= 2
+DECK  ?= inputs/beam.toml
+ARGS  ?=
+
+help:
+	@echo "make run       install what is missing, build, run $(DECK) on $(RANKS) ranks"
+	@echo "make test      all tests"
+	@echo "make lint      format and clippy, warnings are errors"
+	@echo "make bench     measure"
+	@echo "make validate  the longer tests: decks with published numbers"
+	@echo "make docs      the code's own documentation"
+	@echo "make setup     install the Debian packages that are missing"
+	@echo "variables: RANKS=$(RANKS) DECK=$(DECK) ARGS='--set analysis.steps=10'"
+
+setup:
+	@sh jobs/setup.sh
+
+build: setup
+	cargo build --release
+
+# --force: the same command may be given twice.
+run: build
+	@sh jobs/mpirun.sh $(RANKS) target/release/mpm-par $(DECK) --force $(ARGS)
+
+test: setup
+	cargo test --release
+
+bench: setup
+	cargo bench
+
+# The longer tests: every deck with a published number.
+validate: setup
+	cargo test --release -- --ignored
+
+docs: setup
+	cargo doc --no-deps
+
+lint:
+	cargo fmt --check
+	cargo clippy --all-targets -- -D warnings
+
+clean:
+	cargo clean
