@@ -7,12 +7,14 @@
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
+//! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
 pub mod domain;
 pub mod gimp;
 pub mod groups;
 pub mod mpm;
+mod product;
 
 pub use domain::update_domains;
 pub use groups::Groups;
