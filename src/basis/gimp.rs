@@ -5,19 +5,19 @@
 //! for any half length and free of cancellation. Parts beyond the grid find no nodes: there the
 //! weights sum to less than one.
 //!
-//! A cell is populated when it is overlapped by more than [`OVERLAP_TOLERANCE`] of its size on
+//! A cell is populated when it is overlapped by more than [`LINE_TOLERANCE`] of its size on
 //! each axis; one that is only touched, or overlapped by round-off, is not. The cell that holds
 //! the centre always counts. The row of a point is exactly the nodes of its populated cells.
 
 use super::product::{Line, for_each_index, push_row};
 use super::{Influences, outside};
 use crate::error::{Error, Result};
+use crate::grid::lattice::LINE_TOLERANCE;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
-/// Overlap, as a share of the cell size, up to which a domain's end is taken to lie on the grid
-/// line: far above round-off of positions on large grids, far below any length that matters.
-pub const OVERLAP_TOLERANCE: f64 = 1e-10;
+/// Half length in cells below which a domain has vanished: its ends are no longer distinct.
+const SMALLEST_REACH: f64 = 1e-13;
 
 /// The first and last cell overlapped along one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -32,8 +32,8 @@ impl Span {
     fn new(low: f64, centre: f64, high: f64, cells: usize) -> Self {
         // Conversion to usize saturates: ends beyond the grid are clamped to it.
         let home = (centre as usize).min(cells - 1);
-        let first = ((low + OVERLAP_TOLERANCE) as usize).min(home);
-        let last = ((high - OVERLAP_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
+        let first = ((low + LINE_TOLERANCE) as usize).min(home);
+        let last = ((high - LINE_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
         Span { first, last }
     }
 }
@@ -50,13 +50,15 @@ pub(super) fn spans<const D: usize>(
     let mut spans = [Span { first: 0, last: 0 }; D];
     for axis in 0..D {
         let centre = lattice.scaled(axis, x[axis]);
-        if !(centre >= 0.0 && centre <= lattice.cells[axis] as f64) {
+        let end = lattice.cells[axis] as f64;
+        if !(centre >= -LINE_TOLERANCE && centre <= end + LINE_TOLERANCE) {
             return Err(outside(grid, points, p));
         }
         let reach = half[axis] / lattice.spacing[axis];
-        if !(reach > 0.0 && reach.is_finite()) {
+        if !(reach > SMALLEST_REACH && reach.is_finite()) {
             return Err(Error::Run(format!(
-                "point {} at {x:?} m has domain half lengths {half:?} m; each must be positive",
+                "point {} at {x:?} m has domain half lengths {half:?} m; each must be \
+                 positive, and not negligible against the cells",
                 points.id[p]
             )));
         }
@@ -109,13 +111,14 @@ fn fill(line: &mut Line, span: Span, centre: f64, reach: f64, cells: usize, spac
     // round-off parts from a grid line continues the hat's straight line.
     let offset = centre - span.first as f64;
     let (mut low, mut high) = (offset - reach, offset + reach);
-    if span.first == 0 {
-        low = low.max(0.0);
+    let per_length = 1.0 / (high - low);
+    if span.first == 0 && low < -LINE_TOLERANCE {
+        low = 0.0;
     }
-    if span.last + 1 == cells {
-        high = high.min((last + 1) as f64);
+    let edge = (last + 1) as f64;
+    if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
+        high = edge;
     }
-    let per_length = 1.0 / (2.0 * reach);
     for cell in 0..=last {
         let start = if cell == 0 { low } else { cell as f64 };
         let end = if cell == last { high } else { (cell + 1) as f64 };

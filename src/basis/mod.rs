@@ -16,6 +16,9 @@ pub mod groups;
 pub mod mpm;
 mod product;
 
+#[cfg(test)]
+mod tests;
+
 pub use domain::update_domains;
 pub use groups::Groups;
 

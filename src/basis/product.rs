@@ -1,5 +1,7 @@
 //! S_v(x) = prod_a S_va(x_a): one-dimensional functions multiplied over the axes of a lattice.
 
+#![allow(clippy::needless_range_loop, reason = "one index runs over several arrays")]
+
 use super::Influences;
 use crate::grid::Lattice;
 
