@@ -18,6 +18,7 @@
 use nalgebra::Matrix3;
 
 use super::gimp::spans;
+use super::lattice_of;
 use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
@@ -44,6 +45,7 @@ pub fn update_domains<const D: usize>(
     if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
         return Ok(());
     }
+    assert_eq!(increments.len(), points.len(), "one increment for each point");
     for (p, increment) in increments.iter().enumerate() {
         let gradient = &points.deformation_gradient[p];
         let initial = &points.half_length_initial[p];
@@ -117,7 +119,7 @@ fn extent_of_moved_sides<const D: usize>(
     p: usize,
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<[f64; D]> {
-    let Grid::Lattice(lattice) = grid;
+    let lattice = lattice_of(grid)?;
     let spans = spans(grid, lattice, points, p)?;
     let (x, half) = (&points.position[p], &points.half_length[p]);
 

@@ -1,5 +1,7 @@
 //! The deformation modes of Lagrangian Table 2, in two and three dimensions.
 
+#![allow(clippy::needless_range_loop, reason = "one index runs over several arrays")]
+
 use nalgebra::Matrix3;
 
 use super::update_domains;

@@ -10,7 +10,7 @@
 //! the centre always counts. The row of a point is exactly the nodes of its populated cells.
 
 use super::product::{Line, for_each_index, push_row};
-use super::{Influences, outside};
+use super::{Influences, lattice_of, outside};
 use crate::error::{Error, Result};
 use crate::grid::lattice::LINE_TOLERANCE;
 use crate::grid::{Grid, Lattice};
@@ -71,7 +71,7 @@ pub(super) fn map_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
-    let Grid::Lattice(lattice) = grid;
+    let lattice = lattice_of(grid)?;
     let mut influences = Influences::with_capacity(points.len(), 3usize.pow(D as u32));
     let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
     for p in 0..points.len() {
@@ -93,7 +93,7 @@ pub(super) fn populated_cells<const D: usize>(
     p: usize,
     out: &mut Vec<usize>,
 ) -> Result<()> {
-    let Grid::Lattice(lattice) = grid;
+    let lattice = lattice_of(grid)?;
     let spans = spans(grid, lattice, points, p)?;
     for_each_index(&spans.map(|s| s.last - s.first + 1), |index| {
         out.push(lattice.cell_at(std::array::from_fn(|a| spans[a].first + index[a])));

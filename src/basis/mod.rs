@@ -24,7 +24,7 @@ pub use groups::Groups;
 
 use crate::deck::model::Basis;
 use crate::error::{Error, Result};
-use crate::grid::Grid;
+use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
 /// Nodes, weights S and gradients dS/dX~ of all points of a rank, in compressed rows.
@@ -119,11 +119,18 @@ fn unavailable(basis: Basis) -> Error {
     Error::Input(format!("method.basis = {basis:?} is not available; use mpm or gimp"))
 }
 
+/// The lattice that `gimp` needs under its axis-aligned domains.
+pub(crate) fn lattice_of<const D: usize>(grid: &Grid<D>) -> Result<&Lattice<D>> {
+    match grid {
+        Grid::Lattice(lattice) => Ok(lattice),
+    }
+}
+
 /// The error for a point whose position `x` is in no cell.
 pub(crate) fn outside<const D: usize>(grid: &Grid<D>, points: &Points<D>, p: usize) -> Error {
-    let Grid::Lattice(lattice) = grid;
-    let low = lattice.origin;
-    let high = lattice.node_position(lattice.node_count() - 1);
+    let (low, high) = match grid {
+        Grid::Lattice(lattice) => (lattice.origin, lattice.node_position(lattice.node_count() - 1)),
+    };
     Error::Run(format!(
         "point {} of body {} is at {:?} m, outside the grid, which spans {low:?} to {high:?} m; \
          enlarge the grid or look for what drove the point away",

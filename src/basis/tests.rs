@@ -1,5 +1,7 @@
 //! What every basis owes: partition of unity, linear fields, gradients, rows = populated cells.
 
+#![allow(clippy::needless_range_loop, reason = "one index runs over several arrays")]
+
 use proptest::prelude::*;
 
 use super::{Groups, Influences, map_points, populated_cells};

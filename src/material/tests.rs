@@ -1,5 +1,7 @@
 //! What every model owes: yield surface, consistent tangent, energy, no surprises at the limits.
 
+#![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
+
 use proptest::prelude::*;
 
 use super::{Hencky, Material, Response, VonMises};

@@ -2,6 +2,8 @@
 //! no principal axes, the logarithm and its derivative from their integrals
 //! ln b = int_0^1 (b - 1) r dt and d ln b = int_0^1 r db r dt with r = (1 + t (b - 1))^-1.
 
+#![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
+
 use nalgebra::Matrix3;
 
 use super::tests::{Case, elastic, plastic};

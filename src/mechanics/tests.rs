@@ -1,5 +1,7 @@
 //! Stress and tangent against differences, closed forms and the papers' formulas.
 
+#![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
+
 use nalgebra::Matrix3;
 
 use super::{Contribution, StepStart, StressState, contribution, stress};
