@@ -18,6 +18,7 @@
 use nalgebra::Matrix3;
 
 use super::gimp::spans;
+use super::lattice_of;
 use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
@@ -27,7 +28,7 @@ use crate::tensor::spectral::square_root;
 /// Updates `points.half_length` at the end of a step: after `deformation_gradient` has become
 /// that of the step's end, while `position` and `half_length` are still those of its start.
 ///
-/// `increments` holds dF of each point (read for `normal-incremental`), `displacement` gives the
+/// `increments` holds dF, one for each point (its value is read for `normal-incremental`), `displacement` gives the
 /// step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
 /// point's own row of [`map_points`](super::map_points) (read for `corners`).
 ///
@@ -44,7 +45,8 @@ pub fn update_domains<const D: usize>(
     if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
         return Ok(());
     }
-    for p in 0..points.len() {
+    assert_eq!(increments.len(), points.len(), "one increment for each point");
+    for (p, increment) in increments.iter().enumerate() {
         let gradient = &points.deformation_gradient[p];
         let initial = &points.half_length_initial[p];
         let new = match (basis, rule) {
@@ -65,8 +67,8 @@ pub fn update_domains<const D: usize>(
             }
             (_, DomainUpdate::NormalIncremental) => {
                 let before = &points.half_length[p];
-                let lengths = scaled_by_diagonal(before, &increments[p]);
-                with_product(lengths, increments[p].determinant() * product(before))
+                let lengths = scaled_by_diagonal(before, increment);
+                with_product(lengths, increment.determinant() * product(before))
             }
             (_, DomainUpdate::Corners) => {
                 let lengths = extent_of_moved_sides(grid, points, p, displacement)?;
@@ -74,6 +76,7 @@ pub fn update_domains<const D: usize>(
             }
         };
         if !new.iter().all(|l| *l > 0.0 && l.is_finite()) {
+            let rule = if basis == Basis::Mpm { DomainUpdate::None } else { rule };
             return Err(collapsed(points, p, rule, new));
         }
         points.half_length[p] = new;
@@ -116,7 +119,7 @@ fn extent_of_moved_sides<const D: usize>(
     p: usize,
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<[f64; D]> {
-    let Grid::Lattice(lattice) = grid;
+    let lattice = lattice_of(grid)?;
     let spans = spans(grid, lattice, points, p)?;
     let (x, half) = (&points.position[p], &points.half_length[p]);
 
@@ -175,7 +178,7 @@ fn collapsed<const D: usize>(
     let gradient = &points.deformation_gradient[p];
     let diagonal: [f64; D] = std::array::from_fn(|i| gradient[(i, i)]);
     let advice = match rule {
-        DomainUpdate::Corners | DomainUpdate::Stretch => {
+        DomainUpdate::Corners | DomainUpdate::Stretch | DomainUpdate::None => {
             "the deformation itself is not valid: try smaller steps"
         }
         _ => "method.domain_update = \"corners\" or \"stretch\" stays valid under rotation",
@@ -188,3 +191,7 @@ fn collapsed<const D: usize>(
         gradient.determinant(),
     ))
 }
+
+#[cfg(test)]
+#[path = "domain_tests.rs"]
+mod tests;

@@ -5,18 +5,19 @@
 //! for any half length and free of cancellation. Parts beyond the grid find no nodes: there the
 //! weights sum to less than one.
 //!
-//! A cell is populated when it is overlapped by more than [`OVERLAP_TOLERANCE`] of its size on
+//! A cell is populated when it is overlapped by more than [`LINE_TOLERANCE`] of its size on
 //! each axis; one that is only touched, or overlapped by round-off, is not. The cell that holds
 //! the centre always counts. The row of a point is exactly the nodes of its populated cells.
 
-use super::{Influences, outside};
+use super::product::{Line, for_each_index, push_row};
+use super::{Influences, lattice_of, outside};
 use crate::error::{Error, Result};
+use crate::grid::lattice::LINE_TOLERANCE;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
-/// Overlap, as a share of the cell size, up to which a domain's end is taken to lie on the grid
-/// line: far above round-off of positions on large grids, far below any length that matters.
-pub const OVERLAP_TOLERANCE: f64 = 1e-10;
+/// Half length in cells below which a domain has vanished: its ends are no longer distinct.
+const SMALLEST_REACH: f64 = 1e-13;
 
 /// The first and last cell overlapped along one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,8 +32,8 @@ impl Span {
     fn new(low: f64, centre: f64, high: f64, cells: usize) -> Self {
         // Conversion to usize saturates: ends beyond the grid are clamped to it.
         let home = (centre as usize).min(cells - 1);
-        let first = ((low + OVERLAP_TOLERANCE) as usize).min(home);
-        let last = ((high - OVERLAP_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
+        let first = ((low + LINE_TOLERANCE) as usize).min(home);
+        let last = ((high - LINE_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
         Span { first, last }
     }
 }
@@ -49,13 +50,15 @@ pub(super) fn spans<const D: usize>(
     let mut spans = [Span { first: 0, last: 0 }; D];
     for axis in 0..D {
         let centre = lattice.scaled(axis, x[axis]);
-        if !(centre >= 0.0 && centre <= lattice.cells[axis] as f64) {
+        let end = lattice.cells[axis] as f64;
+        if !(centre >= -LINE_TOLERANCE && centre <= end + LINE_TOLERANCE) {
             return Err(outside(grid, points, p));
         }
         let reach = half[axis] / lattice.spacing[axis];
-        if !(reach > 0.0 && reach.is_finite()) {
+        if !(reach > SMALLEST_REACH && reach.is_finite()) {
             return Err(Error::Run(format!(
-                "point {} at {x:?} m has domain half lengths {half:?} m; each must be positive",
+                "point {} at {x:?} m has domain half lengths {half:?} m; each must be \
+                 positive, and not negligible against the cells",
                 points.id[p]
             )));
         }
@@ -68,7 +71,7 @@ pub(super) fn map_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
-    let Grid::Lattice(lattice) = grid;
+    let lattice = lattice_of(grid)?;
     let mut influences = Influences::with_capacity(points.len(), 3usize.pow(D as u32));
     let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
     for p in 0..points.len() {
@@ -76,10 +79,10 @@ pub(super) fn map_points<const D: usize>(
         for axis in 0..D {
             let centre = lattice.scaled(axis, points.position[p][axis]);
             let reach = points.half_length[p][axis] / lattice.spacing[axis];
-            lines[axis].fill(spans[axis], centre, reach, lattice.cells[axis]);
+            let (cells, spacing) = (lattice.cells[axis], lattice.spacing[axis]);
+            fill(&mut lines[axis], spans[axis], centre, reach, cells, spacing);
         }
-        push_product(lattice, &spans, &lines, &mut influences);
-        influences.close_row();
+        push_row(lattice, &lines, &mut influences);
     }
     Ok(influences)
 }
@@ -90,7 +93,7 @@ pub(super) fn populated_cells<const D: usize>(
     p: usize,
     out: &mut Vec<usize>,
 ) -> Result<()> {
-    let Grid::Lattice(lattice) = grid;
+    let lattice = lattice_of(grid)?;
     let spans = spans(grid, lattice, points, p)?;
     for_each_index(&spans.map(|s| s.last - s.first + 1), |index| {
         out.push(lattice.cell_at(std::array::from_fn(|a| spans[a].first + index[a])));
@@ -98,74 +101,32 @@ pub(super) fn populated_cells<const D: usize>(
     Ok(())
 }
 
-/// One-dimensional weights and slopes (per cell size) of the nodes of a span.
-#[derive(Debug, Clone, Default)]
-struct Line {
-    weights: Vec<f64>,
-    slopes: Vec<f64>,
-}
-
-impl Line {
-    #[inline]
-    fn fill(&mut self, span: Span, centre: f64, reach: f64, cells: usize) {
-        let nodes = span.last - span.first + 2;
-        for values in [&mut self.weights, &mut self.slopes] {
-            values.clear();
-            values.resize(nodes, 0.0);
-        }
-        // Distances are taken from the span's first node, so large grids cost no digits. The
-        // outermost pieces end where the domain ends, or at the grid's edge: an end that only
-        // round-off parts from a grid line continues the hat's straight line.
-        let offset = centre - span.first as f64;
-        let (low, high) = (offset - reach, offset + reach);
-        let low = if span.first == 0 { low.max(0.0) } else { low };
-        let high = if span.last + 1 == cells { high.min((nodes - 1) as f64) } else { high };
-        let last = nodes - 2;
-        for cell in 0..=last {
-            let start = if cell == 0 { low } else { cell as f64 };
-            let end = if cell == last { high } else { (cell + 1) as f64 };
-            let share = (end - start) / (2.0 * reach);
-            let middle = 0.5 * (start + end) - cell as f64;
-            self.weights[cell] += share * (1.0 - middle);
-            self.weights[cell + 1] += share * middle;
-            self.slopes[cell] -= share;
-            self.slopes[cell + 1] += share;
-        }
+/// Fills `line` with the means of the hats over [centre - reach, centre + reach], in cells.
+#[inline]
+fn fill(line: &mut Line, span: Span, centre: f64, reach: f64, cells: usize, spacing: f64) {
+    let last = span.last - span.first;
+    line.reset(span.first, last + 2);
+    // Distances are taken from the span's first node, so large grids cost no digits. The
+    // outermost pieces end where the domain ends, or at the grid's edge: an end that only
+    // round-off parts from a grid line continues the hat's straight line.
+    let offset = centre - span.first as f64;
+    let (mut low, mut high) = (offset - reach, offset + reach);
+    let per_length = 1.0 / (high - low);
+    if span.first == 0 && low < -LINE_TOLERANCE {
+        low = 0.0;
     }
-}
-
-/// Pushes the tensor product of the lines, nodes ascending.
-#[inline]
-fn push_product<const D: usize>(
-    lattice: &Lattice<D>,
-    spans: &[Span; D],
-    lines: &[Line; D],
-    influences: &mut Influences<D>,
-) {
-    for_each_index(&spans.map(|s| s.last - s.first + 2), |index| {
-        let node = lattice.node_at(std::array::from_fn(|a| spans[a].first + index[a]));
-        let weights: [f64; D] = std::array::from_fn(|a| lines[a].weights[index[a]]);
-        let gradient = std::array::from_fn(|axis| {
-            let slope = lines[axis].slopes[index[axis]] / lattice.spacing[axis];
-            (0..D).filter(|&a| a != axis).fold(slope, |product, a| product * weights[a])
-        });
-        influences.push(node, weights.iter().product(), gradient);
-    });
-}
-
-/// Calls `visit` with every index below `counts`, first axis fastest.
-#[inline]
-fn for_each_index<const D: usize>(counts: &[usize; D], mut visit: impl FnMut([usize; D])) {
-    let total: usize = counts.iter().product();
-    let mut index = [0; D];
-    for _ in 0..total {
-        visit(index);
-        for axis in 0..D {
-            index[axis] += 1;
-            if index[axis] < counts[axis] {
-                break;
-            }
-            index[axis] = 0;
-        }
+    let edge = (last + 1) as f64;
+    if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
+        high = edge;
+    }
+    for cell in 0..=last {
+        let start = if cell == 0 { low } else { cell as f64 };
+        let end = if cell == last { high } else { (cell + 1) as f64 };
+        let share = (end - start) * per_length;
+        let middle = 0.5 * (start + end) - cell as f64;
+        line.weights[cell] += share * (1.0 - middle);
+        line.weights[cell + 1] += share * middle;
+        line.slopes[cell] -= share / spacing;
+        line.slopes[cell + 1] += share / spacing;
     }
 }

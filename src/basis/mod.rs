@@ -7,19 +7,24 @@
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
+//! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
 pub mod domain;
 pub mod gimp;
 pub mod groups;
 pub mod mpm;
+mod product;
+
+#[cfg(test)]
+mod tests;
 
 pub use domain::update_domains;
 pub use groups::Groups;
 
 use crate::deck::model::Basis;
 use crate::error::{Error, Result};
-use crate::grid::Grid;
+use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
 /// Nodes, weights S and gradients dS/dX~ of all points of a rank, in compressed rows.
@@ -114,11 +119,18 @@ fn unavailable(basis: Basis) -> Error {
     Error::Input(format!("method.basis = {basis:?} is not available; use mpm or gimp"))
 }
 
+/// The lattice that `gimp` needs under its axis-aligned domains.
+pub(crate) fn lattice_of<const D: usize>(grid: &Grid<D>) -> Result<&Lattice<D>> {
+    match grid {
+        Grid::Lattice(lattice) => Ok(lattice),
+    }
+}
+
 /// The error for a point whose position `x` is in no cell.
 pub(crate) fn outside<const D: usize>(grid: &Grid<D>, points: &Points<D>, p: usize) -> Error {
-    let Grid::Lattice(lattice) = grid;
-    let low = lattice.origin;
-    let high = lattice.node_position(lattice.node_count() - 1);
+    let (low, high) = match grid {
+        Grid::Lattice(lattice) => (lattice.origin, lattice.node_position(lattice.node_count() - 1)),
+    };
     Error::Run(format!(
         "point {} of body {} is at {:?} m, outside the grid, which spans {low:?} to {high:?} m; \
          enlarge the grid or look for what drove the point away",

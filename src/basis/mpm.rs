@@ -3,9 +3,10 @@
 //! A point on a grid line belongs to the upper cell ([`Grid::locate`]); the row holds all nodes
 //! of its cell, also those with weight zero.
 
+use super::product::{Line, push_row};
 use super::{Influences, outside};
 use crate::error::Result;
-use crate::grid::{Grid, Lattice};
+use crate::grid::Grid;
 use crate::points::Points;
 
 pub(super) fn map_points<const D: usize>(
@@ -15,13 +16,20 @@ pub(super) fn map_points<const D: usize>(
     let mut influences = Influences::with_capacity(points.len(), 1 << D);
     match grid {
         Grid::Lattice(lattice) => {
+            let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
             for p in 0..points.len() {
                 let x = &points.position[p];
                 let cell = lattice.locate(x).ok_or_else(|| outside(grid, points, p))?;
                 let low = lattice.cell_index(cell);
-                let local = std::array::from_fn(|a| lattice.scaled(a, x[a]) - low[a] as f64);
-                push_cell(lattice, low, local, &mut influences);
-                influences.close_row();
+                for axis in 0..D {
+                    let local = lattice.scaled(axis, x[axis]) - low[axis] as f64;
+                    let slope = 1.0 / lattice.spacing[axis];
+                    let line = &mut lines[axis];
+                    line.reset(low[axis], 2);
+                    line.weights.copy_from_slice(&[1.0 - local, local]);
+                    line.slopes.copy_from_slice(&[-slope, slope]);
+                }
+                push_row(lattice, &lines, &mut influences);
             }
         }
     }
@@ -36,24 +44,4 @@ pub(super) fn populated_cells<const D: usize>(
 ) -> Result<()> {
     out.push(grid.locate(&points.position[p]).ok_or_else(|| outside(grid, points, p))?);
     Ok(())
-}
-
-/// Pushes the shape functions of cell `low` at `local` in [0, 1]^D, nodes ascending.
-fn push_cell<const D: usize>(
-    lattice: &Lattice<D>,
-    low: [usize; D],
-    local: [f64; D],
-    influences: &mut Influences<D>,
-) {
-    for corner in 0..1 << D {
-        let upper: [bool; D] = std::array::from_fn(|a| corner >> a & 1 == 1);
-        let weights: [f64; D] =
-            std::array::from_fn(|a| if upper[a] { local[a] } else { 1.0 - local[a] });
-        let gradient = std::array::from_fn(|axis| {
-            let slope = if upper[axis] { 1.0 } else { -1.0 } / lattice.spacing[axis];
-            (0..D).filter(|&a| a != axis).fold(slope, |product, a| product * weights[a])
-        });
-        let node = lattice.node_at(std::array::from_fn(|a| low[a] + usize::from(upper[a])));
-        influences.push(node, weights.iter().product(), gradient);
-    }
 }

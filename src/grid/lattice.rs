@@ -11,6 +11,10 @@ pub struct Lattice<const D: usize> {
     pub cells: [usize; D],
 }
 
+/// Distance in cells up to which a position counts as lying on a grid line: far above round-off,
+/// far below any length that matters. A point this far beyond the grid's edge is still inside.
+pub const LINE_TOLERANCE: f64 = 1e-10;
+
 /// Offsets of a cell's nodes from its lowest one, counter-clockwise, then upward (hex8 order).
 pub const CELL_CORNERS: [[usize; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
@@ -62,7 +66,7 @@ impl<const D: usize> Lattice<D> {
         for axis in 0..D {
             let t = self.scaled(axis, x[axis]);
             let n = self.cells[axis];
-            if !(t >= 0.0 && t <= n as f64) {
+            if !(t >= -LINE_TOLERANCE && t <= n as f64 + LINE_TOLERANCE) {
                 return None;
             }
             index[axis] = (t as usize).min(n - 1);

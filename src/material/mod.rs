@@ -12,6 +12,9 @@
 pub mod hencky;
 pub mod von_mises;
 
+#[cfg(test)]
+mod tests;
+
 pub use hencky::Hencky;
 pub use von_mises::VonMises;
 

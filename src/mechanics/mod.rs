@@ -16,6 +16,8 @@ mod tangent;
 mod update;
 
 #[cfg(test)]
+mod paper_tests;
+#[cfg(test)]
 mod tests;
 
 use nalgebra::Matrix3;

@@ -72,9 +72,14 @@ pub(super) fn pull_back<const D: usize>(
 #[inline]
 fn shear_rate(update: &Update, a: usize, b: usize) -> f64 {
     let (values, logs) = (&update.trial.values, &update.logarithms);
-    // Pairs 01, 12, 20.
-    let pair = if a + b == 2 { 2 } else { a.min(b) };
-    0.5 * update.response.shear[pair] * logarithm_slope(values[a], values[b], logs[a], logs[b])
+    0.5 * update.response.shear[pair(a, b)]
+        * logarithm_slope(values[a], values[b], logs[a], logs[b])
+}
+
+/// Place of the pair in the order 01, 12, 20 of [`Response::shear`](crate::material::Response).
+#[inline]
+fn pair(a: usize, b: usize) -> usize {
+    if a + b == 2 { 2 } else { a.min(b) }
 }
 
 #[inline]
@@ -91,6 +96,18 @@ fn accumulate<const D: usize>(sum: &mut Square<D>, factor: f64, term: &Square<D>
     for k in 0..D {
         for l in 0..D {
             sum[k][l] += factor * term[k][l];
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::pair;
+
+    #[test]
+    fn pairs_follow_the_material() {
+        for (place, (a, b)) in [(0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
+            assert_eq!((pair(a, b), pair(b, a)), (place, place));
         }
     }
 }

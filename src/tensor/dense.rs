@@ -1,5 +1,7 @@
 //! Products, determinants and inverses of `D` x `D` arrays, D = 2 or 3.
 
+#![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
+
 use nalgebra::Matrix3;
 
 /// A second-order tensor in `D` dimensions, `t[row][column]`.
