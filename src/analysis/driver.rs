@@ -9,10 +9,10 @@ use crate::cli::Arguments;
 use crate::deck::model::AnalysisType;
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
+use crate::output::ResultsDirectory;
 use crate::output::log::Log;
 use crate::output::report::{self, Banner, Failure};
 use crate::output::summary::Status;
-use crate::output::ResultsDirectory;
 use crate::parallel::World;
 use crate::petsc::log::Stages;
 use crate::petsc::session::{self, Session};
@@ -24,9 +24,7 @@ use super::{plan, setup};
 
 /// Runs the program after its command line was read; the exit code is the same on all ranks.
 pub fn run(arguments: &Arguments) -> i32 {
-    let Some((universe, _)) =
-        mpi::initialize_with_threading(mpi::Threading::Funneled)
-    else {
+    let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();
     };
@@ -117,14 +115,8 @@ impl Run<'_> {
         directory.write_decks(&self.text, &resolved, world.comm())?;
         self.log.attach(&directory, false, world.comm())?;
         let conditioning = model.deck.analysis.kind == AnalysisType::Conditioning;
-        let mut recorder = Recorder::create(
-            world,
-            &model.deck,
-            directory,
-            self.log,
-            self.versions,
-            conditioning,
-        )?;
+        let mut recorder =
+            Recorder::create(world, &model.deck, directory, self.log, self.versions, conditioning)?;
         clock.end_setup();
 
         let outcome = match model.deck.analysis.kind {
@@ -138,15 +130,13 @@ impl Run<'_> {
             Err(error) => Ending { status: Status::Failed, reason: error.to_string() },
         };
         let figures = quasi_static::figures(world, &model, &points, &recorder)?;
-        let summary =
-            recorder.finish(world, &model.deck, &points, &clock, figures, &ending)?;
+        let summary = recorder.finish(world, &model.deck, &points, &clock, figures, &ending)?;
         recorder.log.say(&report::closing(&summary, &recorder.directory()));
         let unused = self.session.unused_options()?;
         if !unused.is_empty() {
-            recorder.log.say(&format!(
-                "warning: PETSc options that nothing used: {}",
-                unused.join(", ")
-            ));
+            recorder
+                .log
+                .say(&format!("warning: PETSc options that nothing used: {}", unused.join(", ")));
         }
         if ending.status == Status::Completed {
             return Ok(());

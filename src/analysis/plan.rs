@@ -1,7 +1,7 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
-use crate::assembly::numbering::Touched;
 use crate::assembly::Populated;
+use crate::assembly::numbering::Touched;
 use crate::deck::model::{Basis, Every};
 use crate::error::Result;
 use crate::output::report::Plan;

@@ -211,9 +211,7 @@ fn solve_step<const D: usize>(
     let energies = update::energies(points, &model.materials);
     let sums = world.sum_slice(&[energies.strain, energies.plastic, work]);
     let reaction: Vec<f64> = (0..numbering.owned * D)
-        .map(|dof| {
-            if conditions.fixed[dof] { internal[dof] - external_end[dof] } else { 0.0 }
-        })
+        .map(|dof| if conditions.fixed[dof] { internal[dof] - external_end[dof] } else { 0.0 })
         .collect();
     let row = HistoryRow {
         step: number,

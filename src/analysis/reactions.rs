@@ -23,9 +23,10 @@ pub fn reactions<const D: usize>(
         .iter()
         .zip(&conditions.members)
         .map(|(boundary, members)| {
-            let centre = boundary.rotation.as_ref().map_or([0.0; 2], |rotation| {
-                [rotation.centre[0], rotation.centre[1]]
-            });
+            let centre = boundary
+                .rotation
+                .as_ref()
+                .map_or([0.0; 2], |rotation| [rotation.centre[0], rotation.centre[1]]);
             let mut sums = [0.0; 5];
             let mut at = 0;
             while at < members.len() {

@@ -165,8 +165,7 @@ impl Recorder {
         let mut cells = Vec::new();
         let mut connectivity = Vec::new();
         let mut nodes = Vec::new();
-        let on_face: std::collections::BTreeSet<usize> =
-            mesh.ghost_cells.iter().copied().collect();
+        let on_face: std::collections::BTreeSet<usize> = mesh.ghost_cells.iter().copied().collect();
         for &(cell, _) in &mesh.populated.owned {
             nodes.clear();
             model.grid.cell_nodes(cell, &mut nodes);
@@ -205,8 +204,7 @@ impl Recorder {
         verify: BTreeMap<String, f64>,
         ending: &Ending,
     ) -> Result<Summary> {
-        let bodies =
-            body_summaries(points, deck.bodies.len(), deck.method.basis, world.comm());
+        let bodies = body_summaries(points, deck.bodies.len(), deck.method.basis, world.comm());
         let summary = Summary {
             title: deck.title.clone(),
             status: ending.status,

@@ -60,8 +60,7 @@ pub fn matrix<const D: usize>(
             offsets.push(columns.len() as i32);
         }
     }
-    let mut matrix =
-        Matrix::from_csr(world.comm(), D, rows, &offsets, &columns, values)?;
+    let mut matrix = Matrix::from_csr(world.comm(), D, rows, &offsets, &columns, values)?;
     matrix.set_symmetric(true)?;
     let coordinates: Vec<f64> = numbering.nodes[..numbering.owned]
         .iter()

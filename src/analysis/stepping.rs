@@ -22,7 +22,15 @@ impl Stepping {
     pub fn new(steps: usize, duration: f64, policy: OnFailure, smallest: f64) -> Self {
         let halvings = (1.0 / smallest).log2().floor().clamp(0.0, 40.0) as u32;
         let ticks_per_step = 1u64 << halvings;
-        Stepping { steps, duration, ticks_per_step, position: 0, size: ticks_per_step, policy, cuts: 0 }
+        Stepping {
+            steps,
+            duration,
+            ticks_per_step,
+            position: 0,
+            size: ticks_per_step,
+            policy,
+            cuts: 0,
+        }
     }
 
     /// Continues behind `completed` finished steps.

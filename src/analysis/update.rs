@@ -3,8 +3,8 @@
 
 use nalgebra::Matrix3;
 
-use crate::assembly::internal::{deformation_increment, StepPoints};
 use crate::assembly::Numbering;
+use crate::assembly::internal::{StepPoints, deformation_increment};
 use crate::basis::domain::update_domains;
 use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::Result;
@@ -33,23 +33,23 @@ pub struct PointEnergies {
 }
 
 /// Maps nodal increments (local nodes) to the points.
-pub fn increments<const D: usize>(
-    step: StepPoints<'_, D>,
-    displacement: &[f64],
-) -> Increments<D> {
+pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64]) -> Increments<D> {
     let count = step.points.len();
-    let mut made =
-        Increments { deformation: Vec::with_capacity(count), displacement: Vec::with_capacity(count) };
+    let mut made = Increments {
+        deformation: Vec::with_capacity(count),
+        displacement: Vec::with_capacity(count),
+    };
     for p in 0..count {
         let row = step.influences.offsets[p]..step.influences.offsets[p + 1];
         let group = step.groups.group_of_point[p];
-        let nodes = &step.group_nodes
-            [step.groups.node_offsets[group]..step.groups.node_offsets[group + 1]];
+        let nodes =
+            &step.group_nodes[step.groups.node_offsets[group]..step.groups.node_offsets[group + 1]];
         let nodal = |a: usize| -> [f64; D] {
             let start = nodes[a] as usize * D;
             std::array::from_fn(|i| displacement[start + i])
         };
-        made.deformation.push(deformation_increment(&step.influences.gradients[row.clone()], nodal));
+        made.deformation
+            .push(deformation_increment(&step.influences.gradients[row.clone()], nodal));
         let mut moved = [0.0; D];
         for (a, weight) in step.influences.weights[row].iter().enumerate() {
             for (m, u) in moved.iter_mut().zip(nodal(a)) {
@@ -142,7 +142,8 @@ pub fn energies<const D: usize>(points: &Points<D>, materials: &[Material]) -> P
     let mut sum = PointEnergies::default();
     for p in 0..points.len() {
         let elasticity = materials[points.body[p] as usize].elasticity();
-        let strain = Spectrum::of(&points.elastic_left_cauchy_green[p]).values.map(|b| 0.5 * b.ln());
+        let strain =
+            Spectrum::of(&points.elastic_left_cauchy_green[p]).values.map(|b| 0.5 * b.ln());
         sum.strain += elasticity.energy(strain) * points.volume_initial[p];
         sum.plastic += points.dissipation[p] * points.volume_initial[p];
         let speed: f64 = points.velocity[p].iter().map(|v| v * v).sum();

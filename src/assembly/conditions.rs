@@ -105,11 +105,9 @@ fn members<const D: usize>(
 ) -> Result<Vec<bool>> {
     match place {
         Place::CellsOf { body } => cells_of(world, grid, basis, numbering, points, *body),
-        Place::Side { axis, upper } => Ok(numbering
-            .nodes
-            .iter()
-            .map(|&node| grid.on_side(node, *axis, *upper))
-            .collect()),
+        Place::Side { axis, upper } => {
+            Ok(numbering.nodes.iter().map(|&node| grid.on_side(node, *axis, *upper)).collect())
+        }
         Place::Tag(tag) => {
             let tagged = grid.tagged_nodes(tag)?;
             Ok(numbering.nodes.iter().map(|node| tagged.binary_search(node).is_ok()).collect())

@@ -141,9 +141,8 @@ fn add_point<const D: usize>(
     let row = step.influences.offsets[p]..step.influences.offsets[p + 1];
     let gradients = &step.influences.gradients[row];
     let displacement = &work.displacement;
-    let increment = deformation_increment(gradients, |a| {
-        std::array::from_fn(|i| displacement[a * D + i])
-    });
+    let increment =
+        deformation_increment(gradients, |a| std::array::from_fn(|i| displacement[a * D + i]));
     let points = step.points;
     let start = StepStart {
         material: &step.materials[points.body[p] as usize],
@@ -185,7 +184,8 @@ fn add_point<const D: usize>(
     for i in 0..D {
         for j in 0..D {
             let target = &mut work.flux[(i * D + j) * width..(i * D + j + 1) * width];
-            let tangent = contribution.tangent[i][j].map(|row| row.map(|v| v * contribution.volume));
+            let tangent =
+                contribution.tangent[i][j].map(|row| row.map(|v| v * contribution.volume));
             for b in 0..count {
                 for k in 0..D {
                     let mut sum = 0.0;

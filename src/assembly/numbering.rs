@@ -86,17 +86,15 @@ impl Numbering {
         }
         let mut index: FxHashMap<usize, u32> =
             owned.iter().enumerate().map(|(i, &node)| (node, i as u32)).collect();
-        let halo = HaloPlan::build(world, count, ghosts, |node| {
-            index.get(&node).map(|&i| i as usize)
-        })?;
+        let halo =
+            HaloPlan::build(world, count, ghosts, |node| index.get(&node).map(|&i| i as usize))?;
         let mut nodes = owned;
         for &(_, node) in ghosts {
             index.insert(node, nodes.len() as u32);
             nodes.push(node);
         }
-        let mut numbers: Vec<f64> = (0..nodes.len())
-            .map(|i| if i < count { (offset + i) as f64 } else { -1.0 })
-            .collect();
+        let mut numbers: Vec<f64> =
+            (0..nodes.len()).map(|i| if i < count { (offset + i) as f64 } else { -1.0 }).collect();
         halo.forward(world, &mut numbers, 1)?;
         Ok(Numbering {
             owned: count,

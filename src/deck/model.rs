@@ -241,7 +241,6 @@ impl MaterialModel {
     }
 }
 
-#[derive(Debug, Clone)]
 #[derive(Debug, Clone, PartialEq)]
 pub struct Body {
     pub name: String,

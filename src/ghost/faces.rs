@@ -103,10 +103,7 @@ fn share_border_cells<const D: usize>(
     }
     for (_, words) in exchange(world, outgoing.into_iter().collect())? {
         for record in words.chunks_exact(3) {
-            cells.insert(
-                record[0] as usize,
-                Cell { populated: record[1], boundary: record[2] },
-            );
+            cells.insert(record[0] as usize, Cell { populated: record[1], boundary: record[2] });
         }
     }
     Ok(())

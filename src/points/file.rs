@@ -19,7 +19,11 @@ pub fn read_points<const D: usize>(
     first_id: u64,
 ) -> Result<u64> {
     let wrong = |line: u64, what: String| {
-        Error::Input(format!("{}:{line}: {what} (points of body \"{}\")", path.display(), body.name))
+        Error::Input(format!(
+            "{}:{line}: {what} (points of body \"{}\")",
+            path.display(),
+            body.name
+        ))
     };
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)

@@ -86,8 +86,7 @@ fn per_cell<const D: usize>(
             let x: [f64; D] = std::array::from_fn(|a| {
                 lattice.origin[a]
                     + lattice.spacing[a]
-                        * ((low[a] + cell[a]) as f64
-                            + (part[a] as f64 + 0.5) / counts[a] as f64)
+                        * ((low[a] + cell[a]) as f64 + (part[a] as f64 + 0.5) / counts[a] as f64)
             });
             if shape.contains(&x) {
                 let id = first_id + (candidate * per_cell + sub) as u64;
@@ -130,14 +129,7 @@ fn on_lattice<const D: usize>(
         let x = std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
         if shape.contains(&x) {
             let id = first_id + candidate as u64;
-            points.push_unstrained(
-                id,
-                index as u32,
-                x,
-                spacing.powi(D as i32),
-                body.density,
-                half,
-            );
+            points.push_unstrained(id, index as u32, x, spacing.powi(D as i32), body.density, half);
             mark_outermost(points, shape, &x, &half);
         }
     }
