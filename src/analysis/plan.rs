@@ -9,7 +9,7 @@ use crate::parallel::World;
 use crate::points::Points;
 
 use super::discretise::Model;
-use super::quasi_static::imbalance;
+use super::balance::imbalance;
 
 /// Counts the first step's system without building it. Collective.
 pub fn of<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Plan> {

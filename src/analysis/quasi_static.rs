@@ -9,7 +9,7 @@ use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
-use crate::parallel::{World, migrate};
+use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
@@ -19,6 +19,7 @@ use super::equilibrium::{Equilibrium, NewtonSettings};
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
+use super::balance::{self, imbalance};
 use super::{solver, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
@@ -39,9 +40,7 @@ pub fn run<const D: usize>(
         let number = stepping.step_number();
         match solve_step(world, model, points, recorder, clock, span, number)? {
             Ok(solved) => {
-                clock.time(Phase::Migrate, || {
-                    migrate(world, &model.partition, &model.grid, points).map(drop)
-                })?;
+                clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
                 let ended = stepping.accept();
                 recorder.steps_completed = stepping.completed();
                 let mut row = solved.row;
@@ -270,13 +269,6 @@ fn work_of_step<const D: usize>(
             0.5 * (side[0][dof] + side[1][dof]) * displacement[dof]
         })
         .sum()
-}
-
-/// Largest over mean number of points per rank.
-pub fn imbalance(world: &World, points: usize) -> f64 {
-    let total = world.sum_usize(points);
-    let largest = world.max_usize(points);
-    if total == 0 { 1.0 } else { largest as f64 * world.size() as f64 / total as f64 }
 }
 
 /// Figures of merit at the end of the run. Collective.

@@ -69,7 +69,8 @@ impl<const D: usize> Lattice<D> {
             if !(t >= -LINE_TOLERANCE && t <= n as f64 + LINE_TOLERANCE) {
                 return None;
             }
-            index[axis] = (t as usize).min(n - 1);
+            // Round-off must not split a row of points that lie on one grid line.
+            index[axis] = ((t + LINE_TOLERANCE).max(0.0) as usize).min(n - 1);
         }
         Some(self.cell_at(index))
     }
