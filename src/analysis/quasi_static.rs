@@ -13,13 +13,13 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
+use super::balance::{self, imbalance};
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, NewtonSettings};
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
-use super::balance::{self, imbalance};
 use super::{solver, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
