@@ -105,7 +105,10 @@ impl<'a> Table<'a> {
     /// Reports a key that is needed and not there.
     pub fn missing(&self, key: &str, when: &str) -> Reported {
         let known = self.key(key);
-        let mut message = format!("missing {}", known.kind.describe());
+        let mut message = match known.kind {
+            Kind::Table(_) => format!("missing section [{}]", self.full(key)),
+            _ => format!("missing {}", known.kind.describe()),
+        };
         let range = known.range.describe();
         if !range.is_empty() {
             message = format!("{message} {range}");
