@@ -418,7 +418,7 @@ fn checks_of_conditions_and_results() {
                 "acts on nothing: every body has density 0",
             ),
             (&["load.0.gravity=[0, -10]"], "expected only one of \"point\", \"gravity\""),
-            (&["verify.0.field=stress"], "expected one of \"stress.xx\", \"stress.yy\""),
+            (&["verify.0.field=stress"], "expected one of \"stress.xx\", \"stress.xy\""),
             (&["verify.0.field=strss.yy"], "verify.0.field: expected one of \"displacement\""),
             (
                 &["verify.0.field=displacement"],

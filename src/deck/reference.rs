@@ -1,8 +1,8 @@
 //! The schema as documentation: `docs/deck.md` is this text.
 
 use super::expression;
-use super::fields::{FIELDS, FieldRank, TENSOR_COMPONENTS};
-use super::schema::{self, AXES, Kind, Need, Section};
+use super::fields::FIELDS;
+use super::schema::{self, Kind, Need, Section};
 
 /// A complete deck, which a test reads.
 pub const EXAMPLE: &str = include_str!("example.toml");
@@ -56,11 +56,9 @@ fn fields() -> String {
          and whole vectors.\n\n| field | components |\n|---|---|\n",
     );
     for (name, rank) in FIELDS {
-        let components = match rank {
-            FieldRank::Scalar => String::new(),
-            FieldRank::Vector => AXES.map(|c| format!("`{name}.{c}`")).join(" "),
-            FieldRank::Tensor => TENSOR_COMPONENTS.map(|c| format!("`{name}.{c}`")).join(" "),
-        };
+        let components: Vec<String> =
+            rank.components(3).iter().map(|c| format!("`.{c}`")).collect();
+        let components = components.join(" ");
         out.push_str(&format!("| `{name}` | {components} |\n"));
     }
     out
