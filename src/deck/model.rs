@@ -259,7 +259,7 @@ pub enum BodySource {
         shape: Shape,
         seeding: Seeding,
     },
-    /// csv with header x,y[,z],volume[,vx,vy,vz]; path already joined to the deck's folder.
+    /// csv with header `x,y[,z],volume[,vx,vy,vz]`; path already joined to the deck's folder.
     File(PathBuf),
     /// All cells of a mesh, or those with this physical tag.
     MeshCells {

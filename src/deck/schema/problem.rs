@@ -15,7 +15,7 @@ use crate::deck::model::{
 pub const SECTIONS: &[Section] = &[
     Section {
         name: "",
-        header: "top of the file",
+        header: "the top level",
         doc: "What a deck consists of.",
         keys: &[
             key("title", Text, Default("\"\""), "Shown in the banner and stored with the results."),
