@@ -6,7 +6,15 @@
 //! | `gimp` | `gimp.rs` | Ghost §2.5, after Bardenhagen and Kober |
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
+//! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
+
+pub mod corner;
+pub mod cpdi1;
+pub mod cpdi2;
+pub mod row;
+
+pub use row::Row;
 
 use crate::deck::model::Basis;
 use crate::error::Result;

@@ -81,7 +81,8 @@ fn the_lattice_and_the_box_of_quads_agree() {
         mesh.cell_nodes(cell, &mut a);
         lattice.cell_nodes(cell, &mut b);
         assert_eq!(a, b);
-        (a.clear(), b.clear());
+        a.clear();
+        b.clear();
         mesh.face_neighbours(cell, &mut a);
         lattice.face_neighbours(cell, &mut b);
         a.sort_unstable();
