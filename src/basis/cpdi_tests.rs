@@ -1,5 +1,7 @@
 //! CPDI1 and CPDI2 against moments, quadrature, printed formulas and plain interpolation.
 
+#![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
+
 use nalgebra::Matrix3;
 
 use super::*;
