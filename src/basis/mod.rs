@@ -6,6 +6,7 @@
 //! | `gimp` | `gimp.rs` | Ghost §2.5, after Bardenhagen and Kober |
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
+//! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
@@ -21,6 +22,13 @@ mod tests;
 
 pub use domain::update_domains;
 pub use groups::Groups;
+
+pub mod corner;
+pub mod cpdi1;
+pub mod cpdi2;
+pub mod row;
+
+pub use row::Row;
 
 use crate::deck::model::Basis;
 use crate::error::{Error, Result};
