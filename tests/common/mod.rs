@@ -59,11 +59,15 @@ pub fn on_ranks_with(
         OsStr::new(name),
         OsStr::new("--nocapture"),
         OsStr::new("--test-threads=1"),
+        OsStr::new("--include-ignored"),
     ];
     let env: Vec<(&str, &str)> = env.iter().copied().chain([(INSIDE, name)]).collect();
     for &n in counts {
         let output = mpirun(n, &command, &env);
         let stdout = String::from_utf8_lossy(&output.stdout);
+        if std::env::var_os("SHOW").is_some() {
+            eprintln!("{stdout}{}", String::from_utf8_lossy(&output.stderr));
+        }
         assert!(
             output.status.success() && stdout.matches("1 passed").count() == n,
             "{name} failed on {n} ranks ({})\n{stdout}\n{}",
