@@ -65,9 +65,6 @@ pub fn on_ranks_with(
     for &n in counts {
         let output = mpirun(n, &command, &env);
         let stdout = String::from_utf8_lossy(&output.stdout);
-        if std::env::var_os("SHOW").is_some() {
-            eprintln!("{stdout}{}", String::from_utf8_lossy(&output.stderr));
-        }
         assert!(
             output.status.success() && stdout.matches("1 passed").count() == n,
             "{name} failed on {n} ranks ({})\n{stdout}\n{}",
