@@ -3,8 +3,7 @@
 use std::process::exit;
 
 fn main() {
-    let words: Vec<String> = std::env::args().skip(1).collect();
-    match mpm_par::cli::parse(&words) {
+    match mpm_par::cli::parse(std::env::args_os()) {
         Ok(arguments) => exit(mpm_par::analysis::driver::run(&arguments)),
         Err(error) => {
             eprintln!("{error}");

@@ -24,6 +24,10 @@ use super::{plan, setup};
 
 /// Runs the program after its command line was read; the exit code is the same on all ranks.
 pub fn run(arguments: &Arguments) -> i32 {
+    if let Some(text) = &arguments.print {
+        println!("{}", text.trim_end());
+        return 0;
+    }
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();

@@ -1,6 +1,10 @@
 //! One point's nodes while they are collected from several places.
 
+use crate::error::Result;
 use crate::grid::Interpolation;
+use crate::points::Points;
+
+use super::Influences;
 
 /// Triples (node, S, dS/dX~) and the cells they came from. [`Row::merge`] sums what belongs to
 /// the same node; one row can serve all points in turn.
@@ -58,6 +62,23 @@ impl<const D: usize> Row<D> {
     pub fn cells(&self) -> &[usize] {
         &self.cells
     }
+}
+
+/// Influences of all points, each row made by `fill` (which replaces the row it is given).
+pub(super) fn map_points<const D: usize>(
+    points: &Points<D>,
+    mut fill: impl FnMut(usize, &mut Row<D>) -> Result<()>,
+) -> Result<Influences<D>> {
+    let mut influences = Influences::with_capacity(points.len(), 1 << D);
+    let mut row = Row::default();
+    for p in 0..points.len() {
+        fill(p, &mut row)?;
+        for (node, weight, gradient) in row.entries() {
+            influences.push(*node, *weight, *gradient);
+        }
+        influences.close_row();
+    }
+    Ok(influences)
 }
 
 /// Sorts what was appended after `start`, each value once.

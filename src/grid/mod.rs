@@ -84,13 +84,6 @@ impl<const D: usize> Grid<D> {
         }
     }
 
-    /// Coordinates of a node at the start of the run, m.
-    pub fn node_start(&self, node: usize) -> [f64; D] {
-        match self {
-            Grid::Lattice(lattice) => lattice.node_position(node),
-        }
-    }
-
     /// Whether a node lies on a side of the lattice; no node of a mesh does.
     pub fn on_side(&self, node: usize, axis: usize, upper: bool) -> bool {
         match self {
@@ -98,6 +91,7 @@ impl<const D: usize> Grid<D> {
                 let index = lattice.node_index(node)[axis];
                 index == if upper { lattice.cells[axis] } else { 0 }
             }
+            Grid::Mesh(_) => false,
         }
     }
 
@@ -107,16 +101,18 @@ impl<const D: usize> Grid<D> {
             Grid::Lattice(_) => Err(Error::Input(format!(
                 "boundary tag \"{tag}\": a lattice has no tags; use side or box"
             ))),
+            Grid::Mesh(mesh) => mesh.tagged_nodes(tag),
         }
     }
 
     /// The cell that holds `x`, or `None` outside the grid. A point on a shared face belongs to
     /// the upper cell on a lattice (half-open cells; the grid's own upper edge is closed) and
-    /// to the lowest-numbered cell on a mesh.
+    /// to the lowest-numbered cell on a mesh. A mesh holds points up to [`locate::REACH`] of a
+    /// cell outside it: a polygon that turns inside a round outline cuts other chords.
     pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
         match self {
             Grid::Lattice(lattice) => lattice.locate(x),
-            Grid::Mesh(mesh) => mesh.locate(x),
+            Grid::Mesh(mesh) => mesh.locate_near(x, locate::REACH, None).map(|found| found.0),
         }
     }
 
@@ -141,6 +137,35 @@ impl<const D: usize> Grid<D> {
         match self {
             Grid::Lattice(lattice) => lattice.lowest_cell(node),
             Grid::Mesh(mesh) => mesh.lowest_cell(node),
+        }
+    }
+
+    /// Kind of the cells.
+    pub fn element(&self) -> element::Element {
+        match self {
+            Grid::Lattice(_) if D == 2 => element::Element::Quad4,
+            Grid::Lattice(_) => element::Element::Hex8,
+            Grid::Mesh(mesh) => mesh.element,
+        }
+    }
+
+    /// Lowest and highest coordinates of the grid, m.
+    pub fn bounds(&self) -> ([f64; D], [f64; D]) {
+        match self {
+            Grid::Lattice(lattice) => {
+                (lattice.origin, lattice.node_position(lattice.node_count() - 1))
+            }
+            Grid::Mesh(mesh) => {
+                let mut bounds = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+                for node in 0..mesh.node_count() {
+                    let x = mesh.node_position(node);
+                    for axis in 0..D {
+                        bounds.0[axis] = bounds.0[axis].min(x[axis]);
+                        bounds.1[axis] = bounds.1[axis].max(x[axis]);
+                    }
+                }
+                bounds
+            }
         }
     }
 

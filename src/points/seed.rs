@@ -7,9 +7,10 @@ use std::ops::Range;
 use crate::deck::model::{Body, BodySource, Deck, Seeding};
 use crate::deck::{Scope, Shape};
 use crate::error::{Error, Result};
-use crate::grid::{Grid, Lattice};
+use crate::grid::quadrature::SubCell;
+use crate::grid::{Grid, Lattice, Mesh};
 
-use super::Points;
+use super::{Points, rectangle_corners};
 
 /// Which share of the candidates to make.
 #[derive(Debug, Clone, Copy)]
@@ -31,23 +32,35 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
     let mut first_id = 0u64;
     for (index, body) in deck.bodies.iter().enumerate() {
         let made = points.len();
-        let candidates = match &body.source {
-            BodySource::Shape { shape, seeding } => match (seeding, grid) {
-                (Seeding::PerCell(counts), Grid::Lattice(lattice)) => {
-                    per_cell(&mut points, index, body, shape, counts, lattice, share, first_id)
-                }
-                (Seeding::Lattice { spacing, offset }, _) => {
-                    on_lattice(&mut points, index, body, shape, *spacing, offset, share, first_id)?
-                }
-                (Seeding::Gauss(order), Grid::Lattice(lattice)) => {
-                    let counts = vec![*order; D];
-                    per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
-                }
-            },
-            BodySource::File(path) => {
+        let candidates = match (&body.source, grid) {
+            (BodySource::File(path), _) => {
                 super::file::read_points(&mut points, index, body, path, share, first_id)?
             }
-            BodySource::MeshCells { .. } => {
+            (BodySource::Shape { shape, seeding: Seeding::Lattice { spacing, offset } }, _) => {
+                on_lattice(&mut points, index, body, shape, *spacing, offset, share, first_id)?
+            }
+            (BodySource::Shape { shape, seeding }, Grid::Lattice(lattice)) => {
+                let counts = match seeding {
+                    Seeding::PerCell(counts) => counts.clone(),
+                    Seeding::Gauss(order) => vec![*order; D],
+                    Seeding::Lattice { .. } => unreachable!("matched above"),
+                };
+                per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
+            }
+            (BodySource::Shape { shape, seeding }, Grid::Mesh(mesh)) => {
+                let cells: Vec<usize> = (0..mesh.cell_count()).collect();
+                let inside = |x: &[f64; D]| shape.contains(x);
+                in_cells(&mut points, index, body, mesh, &cells, seeding, inside, share, first_id)?
+            }
+            (BodySource::MeshCells { tag, seeding }, Grid::Mesh(mesh)) => {
+                let cells = match tag {
+                    Some(tag) => mesh.tagged_cells(tag)?,
+                    None => (0..mesh.cell_count()).collect(),
+                };
+                let all = |_: &[f64; D]| true;
+                in_cells(&mut points, index, body, mesh, &cells, seeding, all, share, first_id)?
+            }
+            (BodySource::MeshCells { .. }, Grid::Lattice(_)) => {
                 return Err(Error::Input(format!(
                     "body \"{}\" takes the cells of a mesh, but the grid is a lattice; give it \
                      a shape with points_per_cell",
@@ -91,14 +104,71 @@ fn per_cell<const D: usize>(
             if shape.contains(&x) {
                 let id = first_id + (candidate * per_cell + sub) as u64;
                 points.push_unstrained(id, index as u32, x, volume, body.density, half);
-                mark_outermost(points, shape, &x, &half);
+                mark_outermost(points, |neighbour| shape.contains(neighbour), &x, &half);
             }
         }
     }
     (cells * per_cell) as u64
 }
 
-/// Points at offset + (i, j, k) spacing, kept where they are inside.
+/// Sub-cells or Gauss points of the listed mesh cells, kept where they are inside. A mesh body
+/// has no outermost layer: its boundary is the mesh's own.
+#[allow(clippy::too_many_arguments)]
+fn in_cells<const D: usize>(
+    points: &mut Points<D>,
+    index: usize,
+    body: &Body,
+    mesh: &Mesh<D>,
+    cells: &[usize],
+    seeding: &Seeding,
+    inside: impl Fn(&[f64; D]) -> bool,
+    share: Share,
+    first_id: u64,
+) -> Result<u64> {
+    let mut sub_cells: Vec<SubCell<D>> = Vec::new();
+    let mut gauss: Vec<([f64; D], f64)> = Vec::new();
+    // Most sub-cells any element makes of one cell (tetrahedra: 8 per halving of each edge).
+    let per_cell = match seeding {
+        Seeding::PerCell(counts) => counts.iter().max().map_or(1, |n| n.pow(D as u32)) * 6,
+        Seeding::Gauss(order) => order.pow(D as u32) * 6,
+        Seeding::Lattice { .. } => unreachable!("a lattice of points is seeded by its shape"),
+    };
+    for candidate in share.of(cells.len()) {
+        let cell = cells[candidate];
+        sub_cells.clear();
+        match seeding {
+            Seeding::PerCell(counts) => {
+                mesh.sub_cells(cell, std::array::from_fn(|a| counts[a]), &mut sub_cells);
+            }
+            Seeding::Gauss(order) => {
+                gauss.clear();
+                mesh.gauss_points(cell, *order, &mut gauss);
+                sub_cells.extend(gauss.iter().map(|&(position, volume)| {
+                    let half = [0.5 * volume.powf(1.0 / D as f64); D];
+                    let corners = rectangle_corners(position, half);
+                    SubCell { position, volume, corners }
+                }));
+            }
+            Seeding::Lattice { .. } => {}
+        }
+        for (sub, made) in sub_cells.iter().enumerate().filter(|(_, made)| inside(&made.position)) {
+            let half = [0.5 * made.volume.powf(1.0 / D as f64); D];
+            let id = first_id + (candidate * per_cell + sub) as u64;
+            points.push_unstrained(
+                id,
+                index as u32,
+                made.position,
+                made.volume,
+                body.density,
+                half,
+            );
+            *points.corners.last_mut().expect("a point was just pushed") = made.corners;
+        }
+    }
+    Ok((cells.len() * per_cell) as u64)
+}
+
+/// Points at offset + (i, j, k) spacing in the shape's frame, kept where they are inside.
 #[allow(clippy::too_many_arguments)]
 fn on_lattice<const D: usize>(
     points: &mut Points<D>,
@@ -110,7 +180,7 @@ fn on_lattice<const D: usize>(
     share: Share,
     first_id: u64,
 ) -> Result<u64> {
-    let Some((min, max)) = shape.bounds() else {
+    let Some((min, max)) = shape.local_bounds() else {
         return Err(Error::Input(format!(
             "body \"{}\" is unbounded and seeded by a lattice of spacing {spacing}; intersect it \
              with a box, or use points_per_cell",
@@ -124,13 +194,17 @@ fn on_lattice<const D: usize>(
         .collect();
     let candidates = size.iter().product();
     let half = [0.5 * spacing; D];
+    let volume = spacing.powi(D as i32);
     for candidate in share.of(candidates) {
         let at: [usize; D] = split(candidate, &size);
-        let x = std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
-        if shape.contains(&x) {
+        let local: [f64; D] =
+            std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
+        if shape.contains_local(&local) {
+            let placed = shape.to_global(&local);
+            let x = std::array::from_fn(|a| placed[a]);
             let id = first_id + candidate as u64;
-            points.push_unstrained(id, index as u32, x, spacing.powi(D as i32), body.density, half);
-            mark_outermost(points, shape, &x, &half);
+            points.push_unstrained(id, index as u32, x, volume, body.density, half);
+            mark_outermost(points, |neighbour| shape.contains_local(neighbour), &local, &half);
         }
     }
     Ok(candidates as u64)
@@ -139,7 +213,7 @@ fn on_lattice<const D: usize>(
 /// A point is outermost if a neighbour of its seeding would lie outside the shape.
 fn mark_outermost<const D: usize>(
     points: &mut Points<D>,
-    shape: &Shape,
+    contains: impl Fn(&[f64]) -> bool,
     x: &[f64; D],
     half: &[f64; D],
 ) {
@@ -147,7 +221,7 @@ fn mark_outermost<const D: usize>(
         [-2.0, 2.0].iter().any(|step| {
             let mut neighbour = *x;
             neighbour[axis] += step * half[axis];
-            !shape.contains(&neighbour)
+            !contains(&neighbour)
         })
     });
     *points.outermost.last_mut().expect("a point was just pushed") = f64::from(u8::from(outermost));
