@@ -390,3 +390,31 @@ fn inverted_domains_are_refused() {
     let fold = |node: usize| [-2.0 * (grid.node_position(node)[0] - 0.5), 0.0];
     assert!(update_corners(&grid, &mut points, &fold).is_err());
 }
+
+/// Seeding puts CPDI2 points where its functions put them, and volumes agree.
+#[test]
+fn sub_cells_of_meshes_make_consistent_domains() {
+    fn check<const D: usize>(mesh: &Mesh<D>) {
+        let mut cells = Vec::new();
+        mesh.sub_cells(mesh.cell_count() / 2, [2; D], &mut cells);
+        assert_eq!(cells.len(), 1 << D);
+        for cell in &cells {
+            let centre = centroid(&cell.corners);
+            for a in 0..D {
+                assert!((centre[a] - cell.centroid[a]).abs() < 1e-12);
+            }
+            assert!((volume(&cell.corners) - cell.volume).abs() < 1e-13);
+        }
+    }
+    check(&annulus::<2>([6.0, 4.0], 10.0, [6, 40], Element::Quad4, 2.0).unwrap());
+    check(&annulus::<2>([6.0, 4.0], 10.0, [6, 40], Element::Tri3, 2.0).unwrap());
+    for element in [Element::Hex8, Element::Tet4] {
+        let mut mesh = box_mesh([0.0; 3], [1.0; 3], [2; 3], element).unwrap();
+        let moved = (0..mesh.node_count()).map(|n| {
+            let [x, y, z] = mesh.node_position(n);
+            [x + 0.2 * y * z, y + 0.1 * x * z, z - 0.15 * x * y]
+        });
+        mesh.set_positions(moved.collect()).unwrap();
+        check(&mesh);
+    }
+}

@@ -109,6 +109,18 @@ impl<const D: usize> Mesh<D> {
         })
     }
 
+    /// Lowest and highest coordinates of the nodes as they are now, m.
+    pub fn bounds(&self) -> ([f64; D], [f64; D]) {
+        let (mut low, mut high) = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
+        for x in &self.positions {
+            for a in 0..D {
+                low[a] = low[a].min(x[a]);
+                high[a] = high[a].max(x[a]);
+            }
+        }
+        (low, high)
+    }
+
     /// Lowest-numbered cell at a node: the same on every rank.
     pub fn lowest_cell(&self, node: usize) -> usize {
         self.topology.lowest_cell[node] as usize
