@@ -1,5 +1,6 @@
 //! From a checked deck to points on their ranks: seed, partition, migrate, place point forces.
 
+use crate::assembly::manufactured::Manufactured;
 use crate::deck::Deck;
 use crate::deck::model::{self, Load};
 use crate::error::{Error, Result};
@@ -37,7 +38,12 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
             })
         })
         .collect();
-    Ok((Model { deck, grid, partition, materials, penalties }, points))
+    let field = deck.loads.iter().find_map(|load| match load {
+        Load::Manufactured(field) => Some(field),
+        _ => None,
+    });
+    let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
+    Ok((Model { deck, grid, partition, materials, penalties, manufactured }, points))
 }
 
 fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {

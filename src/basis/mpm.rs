@@ -39,10 +39,7 @@ pub(super) fn map_points<const D: usize>(
 }
 
 /// On a mesh the reference coordinates come from the inverse map of the cell.
-fn map_points_on_mesh<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-) -> Result<Influences<D>> {
+fn map_points_on_mesh<const D: usize>(grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
     let mut hint = None;
     row::map_points(points, |p, row| {
         let x = &points.position[p];

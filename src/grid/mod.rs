@@ -155,17 +155,7 @@ impl<const D: usize> Grid<D> {
             Grid::Lattice(lattice) => {
                 (lattice.origin, lattice.node_position(lattice.node_count() - 1))
             }
-            Grid::Mesh(mesh) => {
-                let mut bounds = ([f64::INFINITY; D], [f64::NEG_INFINITY; D]);
-                for node in 0..mesh.node_count() {
-                    let x = mesh.node_position(node);
-                    for axis in 0..D {
-                        bounds.0[axis] = bounds.0[axis].min(x[axis]);
-                        bounds.1[axis] = bounds.1[axis].max(x[axis]);
-                    }
-                }
-                bounds
-            }
+            Grid::Mesh(mesh) => mesh.bounds(),
         }
     }
 

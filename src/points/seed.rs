@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use crate::deck::model::{Body, BodySource, Deck, Seeding};
+use crate::deck::model::{Basis, Body, BodySource, Deck, Seeding};
 use crate::deck::{Scope, Shape};
 use crate::error::{Error, Result};
 use crate::grid::quadrature::SubCell;
@@ -30,6 +30,9 @@ impl Share {
 pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result<Points<D>> {
     let mut points = Points::default();
     let mut first_id = 0u64;
+    // The position of a CPDI2 point is the centroid of its domain; others sit where their
+    // sub-cell's centre maps to.
+    let at_centroid = deck.method.basis == Basis::Cpdi2;
     for (index, body) in deck.bodies.iter().enumerate() {
         let made = points.len();
         let candidates = match (&body.source, grid) {
@@ -50,7 +53,8 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
             (BodySource::Shape { shape, seeding }, Grid::Mesh(mesh)) => {
                 let cells: Vec<usize> = (0..mesh.cell_count()).collect();
                 let inside = |x: &[f64; D]| shape.contains(x);
-                in_cells(&mut points, index, body, mesh, &cells, seeding, inside, share, first_id)?
+                let seeding = CellSeeding { mesh, cells: &cells, seeding, at_centroid };
+                seeding.run(&mut points, index, body, inside, share, first_id)
             }
             (BodySource::MeshCells { tag, seeding }, Grid::Mesh(mesh)) => {
                 let cells = match tag {
@@ -58,7 +62,8 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
                     None => (0..mesh.cell_count()).collect(),
                 };
                 let all = |_: &[f64; D]| true;
-                in_cells(&mut points, index, body, mesh, &cells, seeding, all, share, first_id)?
+                let seeding = CellSeeding { mesh, cells: &cells, seeding, at_centroid };
+                seeding.run(&mut points, index, body, all, share, first_id)
             }
             (BodySource::MeshCells { .. }, Grid::Lattice(_)) => {
                 return Err(Error::Input(format!(
@@ -111,61 +116,68 @@ fn per_cell<const D: usize>(
     (cells * per_cell) as u64
 }
 
-/// Sub-cells or Gauss points of the listed mesh cells, kept where they are inside. A mesh body
-/// has no outermost layer: its boundary is the mesh's own.
-#[allow(clippy::too_many_arguments)]
-fn in_cells<const D: usize>(
-    points: &mut Points<D>,
-    index: usize,
-    body: &Body,
-    mesh: &Mesh<D>,
-    cells: &[usize],
-    seeding: &Seeding,
-    inside: impl Fn(&[f64; D]) -> bool,
-    share: Share,
-    first_id: u64,
-) -> Result<u64> {
-    let mut sub_cells: Vec<SubCell<D>> = Vec::new();
-    let mut gauss: Vec<([f64; D], f64)> = Vec::new();
-    // Most sub-cells any element makes of one cell (tetrahedra: 8 per halving of each edge).
-    let per_cell = match seeding {
-        Seeding::PerCell(counts) => counts.iter().max().map_or(1, |n| n.pow(D as u32)) * 6,
-        Seeding::Gauss(order) => order.pow(D as u32) * 6,
-        Seeding::Lattice { .. } => unreachable!("a lattice of points is seeded by its shape"),
-    };
-    for candidate in share.of(cells.len()) {
-        let cell = cells[candidate];
-        sub_cells.clear();
-        match seeding {
+/// Sub-cells or Gauss points of mesh cells. A mesh body has no outermost layer: its boundary is
+/// the mesh's own.
+struct CellSeeding<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    cells: &'a [usize],
+    seeding: &'a Seeding,
+    at_centroid: bool,
+}
+
+impl<const D: usize> CellSeeding<'_, D> {
+    /// Makes the points that are inside; returns the number of candidates.
+    fn run(
+        &self,
+        points: &mut Points<D>,
+        index: usize,
+        body: &Body,
+        inside: impl Fn(&[f64; D]) -> bool,
+        share: Share,
+        first_id: u64,
+    ) -> u64 {
+        // No element makes more than six times n^D sub-cells of one cell.
+        let n = match self.seeding {
+            Seeding::PerCell(counts) => counts.iter().copied().max().unwrap_or(1),
+            Seeding::Gauss(order) => *order,
+            Seeding::Lattice { .. } => unreachable!("a lattice of points is seeded by its shape"),
+        };
+        let per_cell = 6 * n.pow(D as u32);
+        let mut made = Vec::new();
+        for candidate in share.of(self.cells.len()) {
+            made.clear();
+            self.split(self.cells[candidate], &mut made);
+            for (sub, part) in made.iter().enumerate() {
+                let x = if self.at_centroid { part.centroid } else { part.position };
+                if !inside(&x) {
+                    continue;
+                }
+                let half = [0.5 * part.volume.powf(1.0 / D as f64); D];
+                let id = first_id + (candidate * per_cell + sub) as u64;
+                points.push_unstrained(id, index as u32, x, part.volume, body.density, half);
+                *points.corners.last_mut().expect("a point was just pushed") = part.corners;
+            }
+        }
+        (self.cells.len() * per_cell) as u64
+    }
+
+    fn split(&self, cell: usize, out: &mut Vec<SubCell<D>>) {
+        match self.seeding {
             Seeding::PerCell(counts) => {
-                mesh.sub_cells(cell, std::array::from_fn(|a| counts[a]), &mut sub_cells);
+                self.mesh.sub_cells(cell, std::array::from_fn(|a| counts[a]), out);
             }
             Seeding::Gauss(order) => {
-                gauss.clear();
-                mesh.gauss_points(cell, *order, &mut gauss);
-                sub_cells.extend(gauss.iter().map(|&(position, volume)| {
+                let mut gauss = Vec::new();
+                self.mesh.gauss_points(cell, *order, &mut gauss);
+                out.extend(gauss.into_iter().map(|(position, volume)| {
                     let half = [0.5 * volume.powf(1.0 / D as f64); D];
                     let corners = rectangle_corners(position, half);
-                    SubCell { position, volume, corners }
+                    SubCell { position, centroid: position, volume, corners }
                 }));
             }
             Seeding::Lattice { .. } => {}
         }
-        for (sub, made) in sub_cells.iter().enumerate().filter(|(_, made)| inside(&made.position)) {
-            let half = [0.5 * made.volume.powf(1.0 / D as f64); D];
-            let id = first_id + (candidate * per_cell + sub) as u64;
-            points.push_unstrained(
-                id,
-                index as u32,
-                made.position,
-                made.volume,
-                body.density,
-                half,
-            );
-            *points.corners.last_mut().expect("a point was just pushed") = made.corners;
-        }
     }
-    Ok((cells.len() * per_cell) as u64)
 }
 
 /// Points at offset + (i, j, k) spacing in the shape's frame, kept where they are inside.
