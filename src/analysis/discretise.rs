@@ -1,5 +1,6 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
+use crate::assembly::manufactured::Manufactured;
 use crate::assembly::numbering::Touched;
 use crate::assembly::{Numbering, Pattern, Populated, pattern};
 use crate::basis::{self, Groups, Influences};
@@ -22,6 +23,8 @@ pub struct Model<const D: usize> {
     pub materials: Vec<Material>,
     /// One per body.
     pub penalties: Vec<Penalty>,
+    /// The field of a `manufactured` load with its derivatives.
+    pub manufactured: Option<Manufactured>,
 }
 
 /// Everything a step needs that depends on where the points are at its start.

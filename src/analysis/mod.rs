@@ -8,6 +8,7 @@
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
+//! | the mesh between steps | `motion.rs` | Rotation §2 (viii) |
 //! | migrate, and a new partition where it pays | `balance.rs` | |
 //! | cut and grow load steps | `stepping.rs` | |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
@@ -20,6 +21,7 @@ pub mod clock;
 pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
+pub mod motion;
 pub mod plan;
 pub mod quasi_static;
 pub mod reactions;

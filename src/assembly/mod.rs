@@ -8,11 +8,13 @@
 //! | `internal.rs` | internal force and tangent stiffness of the points (Lagrangian eq. 27, 28) |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
+//! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 
 pub mod conditions;
 pub mod external;
 pub mod internal;
+pub mod manufactured;
 pub mod numbering;
 pub mod pattern;
 pub mod populated;
