@@ -65,14 +65,19 @@ impl<const D: usize> Discretisation<D> {
         let owner_of = |node| partition.owner_of_node(grid, node);
         let (numbering, pattern) = pattern::build(world, touched, owner_of, supports)?;
 
-        let group_nodes = groups.nodes.iter().map(|node| numbering.index[node]).collect();
+        // The groups are the first supports, the faces the others.
+        let (of_groups, of_faces) = pattern.supports.items.split_at(groups.nodes.len());
+        let group_nodes = of_groups.to_vec();
         let mut node_weight = vec![0.0; numbering.len()];
-        for (node, weight) in influences.nodes.iter().zip(&influences.weights) {
-            node_weight[numbering.index[node] as usize] += weight;
+        for (p, &group) in groups.group_of_point.iter().enumerate() {
+            let nodes = pattern.supports.list(group);
+            for (&node, weight) in nodes.iter().zip(&influences.weights[influences.row(p)]) {
+                node_weight[node as usize] += weight;
+            }
         }
         let mut on_face = vec![0.0; numbering.len()];
-        for node in faces.iter().flat_map(|face| &face.nodes) {
-            on_face[numbering.index[node] as usize] = 1.0;
+        for &node in of_faces {
+            on_face[node as usize] = 1.0;
         }
         for field in [&mut node_weight, &mut on_face] {
             numbering.halo.reverse_add(world, field, 1)?;
