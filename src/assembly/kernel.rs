@@ -204,9 +204,14 @@ fn add_runs<const D: usize, const LENGTH: usize>(
 ) {
     for (run, &position) in source.chunks_exact(LENGTH).zip(positions) {
         let start = usize::from(position) * D;
-        for (t, s) in target[start..start + LENGTH].iter_mut().zip(run) {
-            *t += s;
+        let target: &mut [f64; LENGTH] =
+            target[start..].first_chunk_mut().expect("a run lies within its row");
+        // Loaded as wholes: entry by entry the compiler must fear that the slices overlap.
+        let (run, mut sum): (&[f64; LENGTH], _) = (first(run), *target);
+        for (sum, add) in sum.iter_mut().zip(*run) {
+            *sum += add;
         }
+        *target = sum;
     }
 }
 
