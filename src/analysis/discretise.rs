@@ -72,19 +72,23 @@ impl<const D: usize> Discretisation<D> {
         let owner_of = |node| partition.owner_of_node(grid, node);
         let (numbering, pattern) = pattern::build(world, touched, owner_of, supports)?;
 
-        let group_nodes = groups.nodes.iter().map(|node| numbering.index[node]).collect();
+        // The groups are the first supports, the faces the others.
+        let (of_groups, of_faces) = pattern.supports.items.split_at(groups.nodes.len());
+        let group_nodes = of_groups.to_vec();
         let mut node_weight = vec![0.0; numbering.len()];
         let mut node_grip = vec![0.0; numbering.len()];
         let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
-        for (entry, node) in influences.nodes.iter().enumerate() {
-            let local = numbering.index[node] as usize;
-            let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
-            node_weight[local] += influences.weights[entry];
-            node_grip[local] += influences.weights[entry].abs() + reach * slope;
+        for (p, &group) in groups.group_of_point.iter().enumerate() {
+            for (&node, entry) in pattern.supports.list(group).iter().zip(influences.row(p)) {
+                let weight = influences.weights[entry];
+                let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
+                node_weight[node as usize] += weight;
+                node_grip[node as usize] += weight.abs() + reach * slope;
+            }
         }
         let mut on_face = vec![0.0; numbering.len()];
-        for node in faces.iter().flat_map(|face| &face.nodes) {
-            on_face[numbering.index[node] as usize] = 1.0;
+        for &node in of_faces {
+            on_face[node as usize] = 1.0;
         }
         for field in [&mut node_weight, &mut node_grip, &mut on_face] {
             numbering.halo.reverse_add(world, field, 1)?;
