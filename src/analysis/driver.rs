@@ -18,8 +18,8 @@ use crate::petsc::log::Stages;
 use crate::petsc::session::{self, Session};
 
 use super::clock::Clock;
-use super::quasi_static;
 use super::recorder::{Ending, Recorder};
+use super::{explicit, quasi_static};
 use super::{plan, setup};
 
 /// Runs the program after its command line was read; the exit code is the same on all ranks.
@@ -122,6 +122,9 @@ impl Run<'_> {
         let outcome = match model.deck.analysis.kind {
             AnalysisType::QuasiStatic => {
                 quasi_static::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::Explicit => {
+                explicit::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
             other => Err(Error::Input(format!("analysis type {other:?} is not available yet"))),
         };

@@ -6,13 +6,18 @@
 //! | `numbering.rs` | equations over active nodes, contiguous by rank |
 //! | `pattern.rs` | exact sparsity, and where every contribution goes |
 //! | `internal.rs` | internal force and tangent stiffness of the points (Lagrangian eq. 27, 28) |
+//! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
+//! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 
 pub mod conditions;
+pub mod envelope;
 pub mod external;
 pub mod internal;
+pub mod inverse;
+pub mod mass;
 pub mod numbering;
 pub mod pattern;
 pub mod populated;

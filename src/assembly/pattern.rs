@@ -9,7 +9,7 @@ use crate::parallel::{World, exchange};
 use super::numbering::{Numbering, Touched};
 
 /// Exact sparsity of one rank's rows, in blocks of one node.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Pattern {
     /// Row r of the owned nodes is `offsets[r]..offsets[r + 1]`; rows beyond `numbering.owned`
     /// belong to ghosts this rank contributes to, in local order.

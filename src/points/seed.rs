@@ -98,7 +98,7 @@ fn per_cell<const D: usize>(
     (cells * per_cell) as u64
 }
 
-/// Points at offset + (i, j, k) spacing, kept where they are inside.
+/// Points at offset + (i, j, k) spacing in the shape's own frame, kept where they are inside.
 #[allow(clippy::too_many_arguments)]
 fn on_lattice<const D: usize>(
     points: &mut Points<D>,
@@ -110,7 +110,7 @@ fn on_lattice<const D: usize>(
     share: Share,
     first_id: u64,
 ) -> Result<u64> {
-    let Some((min, max)) = shape.bounds() else {
+    let Some((min, max)) = shape.local_bounds() else {
         return Err(Error::Input(format!(
             "body \"{}\" is unbounded and seeded by a lattice of spacing {spacing}; intersect it \
              with a box, or use points_per_cell",
@@ -126,8 +126,11 @@ fn on_lattice<const D: usize>(
     let half = [0.5 * spacing; D];
     for candidate in share.of(candidates) {
         let at: [usize; D] = split(candidate, &size);
-        let x = std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
-        if shape.contains(&x) {
+        let local: [f64; D] =
+            std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
+        if shape.contains_local(&local) {
+            let global = shape.to_global(&local);
+            let x = std::array::from_fn(|a| global[a]);
             let id = first_id + candidate as u64;
             points.push_unstrained(id, index as u32, x, spacing.powi(D as i32), body.density, half);
             mark_outermost(points, shape, &x, &half);
