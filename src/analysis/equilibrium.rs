@@ -78,12 +78,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     ) -> Result<Self> {
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let mut held = conditions.fixed.clone();
-        let mut increment = conditions.increment.clone();
+        let increment = conditions.increment.clone();
         for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {
-            for component in 0..D {
-                held[local * D + component] = true;
-                increment[local * D + component] = 0.0;
-            }
+            // A prescribed motion stays: the gradient may see a node whose weight vanishes.
+            held[local * D..(local + 1) * D].fill(true);
         }
         let owned = numbering.owned * D;
         let held_rows = HeldRows {
@@ -386,7 +384,7 @@ pub fn ghost_matrix<const D: usize>(
     }
     let mut matrix = BlockMatrix::zeros(&mesh.pattern);
     for face in &mesh.faces {
-        let nodes: Vec<u32> = face.nodes.iter().map(|node| mesh.numbering.index[node]).collect();
+        let nodes: Vec<u32> = face.nodes.iter().map(|&node| mesh.numbering.index[node]).collect();
         let factor = weight(face);
         let block: Vec<f64> = face.matrix.iter().map(|value| factor * value).collect();
         matrix.add(&mesh.numbering, &mesh.pattern, &nodes, &block);

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::point_forces;
-use crate::deck::model::{AnalysisType, Load, Mass, StressUpdate};
+use crate::deck::model::{AnalysisType, Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
@@ -14,12 +14,12 @@ use crate::parallel::{World, migrate};
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
+use super::balance::imbalance;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
 use super::ledger::{Entry, Ledger, StepSums};
 use super::mapping;
-use super::quasi_static::imbalance;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::time_step::{TimeSteps, stability_limit};
@@ -150,7 +150,7 @@ fn advance<const D: usize>(
     // Held components move with their boundary's mean velocity over the step.
     let held_velocity: Vec<f64> = conditions.increment.iter().map(|u| u / dt).collect();
     let at_rest = vec![0.0; nodes * D];
-    let external = external_forces(deck.loads.as_slice(), points, span);
+    let external = world.fail_together(external_forces(model, points, span))?;
 
     let mass = clock.time(Phase::Assemble, || {
         let step = mesh.step_points(points, &model.materials);
@@ -233,7 +233,7 @@ fn advance<const D: usize>(
         deformation,
         displacement: carried.iter().map(|v| v.map(|v| v * dt)).collect(),
     };
-    if let Some(why) = update::reason_to_refuse(world, grid, points, &made, true) {
+    if let Some(why) = update::reason_to_refuse(world, grid, points, &made) {
         return Err(Error::Run(why));
     }
 
@@ -294,14 +294,22 @@ fn advance<const D: usize>(
 
 /// Force on each point, empty where there is no load.
 fn external_forces<const D: usize>(
-    loads: &[Load],
+    model: &Model<D>,
     points: &Points<D>,
     span: StepSpan,
-) -> Vec<[f64; D]> {
-    if loads.is_empty() {
-        return Vec::new();
+) -> Result<Vec<[f64; D]>> {
+    if model.deck.loads.is_empty() {
+        return Ok(Vec::new());
     }
-    point_forces(points, loads, AnalysisType::Explicit, span.factor_start, span.time_start)
+    point_forces(
+        points,
+        &model.materials,
+        &model.deck.loads,
+        model.manufactured.as_ref(),
+        AnalysisType::Explicit,
+        span.factor_start,
+        span.time_start,
+    )
 }
 
 /// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the
