@@ -13,12 +13,12 @@ use crate::parallel::{World, migrate};
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
+use super::balance::imbalance;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{expand_ghost, ghost_matrix};
 use super::extremes::{self, Extremes};
 use super::mapping;
-use super::quasi_static::imbalance;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 
