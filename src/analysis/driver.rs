@@ -20,7 +20,7 @@ use crate::petsc::session::{self, Session};
 
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder};
-use super::{explicit, quasi_static};
+use super::{conditioning, explicit, quasi_static};
 use super::{plan, setup};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
@@ -137,6 +137,9 @@ impl Run<'_> {
             }
             AnalysisType::Explicit => {
                 explicit::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::Conditioning => {
+                conditioning::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
             other => Err(Error::Input(format!("analysis type {other:?} is not available yet"))),
         };

@@ -394,7 +394,7 @@ pub fn ghost_matrix<const D: usize>(
 }
 
 /// Writes J ⊗ 1 into the owned rows.
-fn expand_ghost<const D: usize>(
+pub fn expand_ghost<const D: usize>(
     ghost: &BlockMatrix<1>,
     pattern: &Pattern,
     matrix: &mut BlockMatrix<D>,

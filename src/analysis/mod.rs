@@ -4,6 +4,7 @@
 //! |---|---|---|
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
 //! | `explicit` | `explicit.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
+//! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
 //! | points to nodes and back | `mapping.rs` | Ghost eq. 6, 8-10 |
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
@@ -22,10 +23,12 @@
 
 pub mod balance;
 pub mod clock;
+pub mod conditioning;
 pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
 pub mod explicit;
+pub mod extremes;
 pub mod grid_mass;
 pub mod ledger;
 pub mod mapping;

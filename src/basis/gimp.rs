@@ -6,9 +6,9 @@
 //! cell beyond its edge, as the formula says: a domain that sticks out keeps most of its weight
 //! (Lagrangian Table 7 depends on it), though no longer a sum of one.
 //!
-//! A cell is populated when it is overlapped by more than [`LINE_TOLERANCE`] of its size on
-//! each axis; one that is only touched, or overlapped by round-off, is not. The cell that holds
-//! the centre always counts. The row of a point is exactly the nodes of its populated cells.
+//! A cell is populated when it is overlapped along each axis; one that is only touched, to the
+//! rounding of the position, is not. The cell that holds the centre always counts. The row of a
+//! point is exactly the nodes of its populated cells.
 
 use super::product::{Line, for_each_index, push_row};
 use super::{Influences, lattice_of, outside};
@@ -17,6 +17,10 @@ use crate::grid::lattice::LINE_TOLERANCE;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
+/// An overlap counts as touching up to this many roundings of the numbers it is computed from,
+/// and no more: what the roundings of many steps add up to is a true, if tiny, overlap, the very
+/// case that Ghost stabilisation is for (Ghost Figure 3).
+const ROUNDINGS: f64 = 4.0 * f64::EPSILON;
 /// Half length in cells below which a domain has vanished: its ends are no longer distinct.
 const SMALLEST_REACH: f64 = 1e-13;
 
@@ -28,13 +32,14 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// Of the scaled interval [low, high] around `centre`, all in cells from the grid's origin.
+    /// Of the scaled interval [low, high] around `centre`, all in cells from the grid's origin;
+    /// overlaps up to `touch` do not count.
     #[inline]
-    fn new(low: f64, centre: f64, high: f64, cells: usize) -> Self {
+    fn new(low: f64, centre: f64, high: f64, cells: usize, touch: f64) -> Self {
         // Conversion to usize saturates: ends beyond the grid are clamped to it.
         let home = (centre as usize).min(cells - 1);
-        let first = ((low + LINE_TOLERANCE) as usize).min(home);
-        let last = ((high - LINE_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
+        let first = ((low + touch) as usize).min(home);
+        let last = ((high - touch).ceil() as usize).clamp(home + 1, cells) - 1;
         Span { first, last }
     }
 }
@@ -63,7 +68,10 @@ pub(super) fn spans<const D: usize>(
                 points.id[p]
             )));
         }
-        spans[axis] = Span::new(centre - reach, centre, centre + reach, lattice.cells[axis]);
+        let size = x[axis].abs() + lattice.origin[axis].abs() + half[axis];
+        let touch = ROUNDINGS * (size / lattice.spacing[axis]);
+        let (low, high) = (centre - reach, centre + reach);
+        spans[axis] = Span::new(low, centre, high, lattice.cells[axis], touch);
     }
     Ok(spans)
 }

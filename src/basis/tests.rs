@@ -204,7 +204,7 @@ fn a_domain_that_fills_its_cell_touches_no_other() {
     let grid = lattice::<3>();
     for cell in 0..grid.cell_count() {
         let index = grid.cell_index(cell);
-        for noise in [0.0, 3e-13, -3e-13] {
+        for noise in [0.0, 3e-16, -3e-16] {
             let t = std::array::from_fn(|a| index[a] as f64 + 0.5);
             let points = points_at::<3>(&[(t, [0.5 + noise; 3])]);
             assert_eq!(cells_of(Basis::Gimp, &points, 0), [cell]);
