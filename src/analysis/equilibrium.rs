@@ -384,7 +384,7 @@ pub fn ghost_matrix<const D: usize>(
     }
     let mut matrix = BlockMatrix::zeros(&mesh.pattern);
     for face in &mesh.faces {
-        let nodes: Vec<u32> = face.nodes.iter().map(|node| mesh.numbering.index[node]).collect();
+        let nodes: Vec<u32> = face.nodes.iter().map(|&node| mesh.numbering.index[node]).collect();
         let factor = weight(face);
         let block: Vec<f64> = face.matrix.iter().map(|value| factor * value).collect();
         matrix.add(&mesh.numbering, &mesh.pattern, &nodes, &block);
