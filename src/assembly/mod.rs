@@ -10,6 +10,7 @@
 //! | `internal.rs` | internal force and tangent stiffness of the points (Lagrangian eq. 27, 28) |
 //! | `places.rs` | where each dense block lies in the rows |
 //! | `kernel.rs` | the same sums, tiled for vector registers |
+//! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
@@ -23,6 +24,7 @@ pub mod node_index;
 pub mod numbering;
 pub mod pattern;
 pub mod places;
+pub mod plain;
 pub mod populated;
 pub mod scatter;
 
