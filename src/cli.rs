@@ -1,40 +1,235 @@
-//! temporary
-use std::path::PathBuf;
+//! Command line (design: options with two dashes are ours, words with one dash go to PETSc).
+
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+use crate::error::{Error, Result};
+
+/// The command line, read.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Arguments {
+    /// Text of `--help` or `--version`: print it and leave with 0; nothing else is set.
+    pub print: Option<String>,
+    /// The deck.
     pub input: PathBuf,
+    /// `KEY=VALUE`, in order.
     pub sets: Vec<String>,
+    /// Results directory: `--out`, or `out/<deck file stem>`.
     pub out: PathBuf,
+    /// Validate and plan, run nothing.
     pub check: bool,
-    pub restart: Option<String>,
+    pub restart: Option<Restart>,
+    /// Overwrite existing results.
     pub force: bool,
+    /// PETSc options and their values, untouched and in order.
     pub petsc: Vec<String>,
 }
-pub fn parse(w: &[String]) -> crate::error::Result<Arguments> {
-    let mut a = Arguments {
-        input: w[0].clone().into(),
-        sets: vec![],
-        out: PathBuf::from("out").join(PathBuf::from(&w[0]).file_stem().unwrap()),
-        check: false,
-        restart: None,
-        force: false,
-        petsc: vec![],
-    };
-    let mut i = 1;
-    while i < w.len() {
-        match w[i].as_str() {
-            "--set" => {
-                i += 1;
-                a.sets.push(w[i].clone())
-            }
-            "--out" => {
-                i += 1;
-                a.out = w[i].clone().into()
-            }
-            "--force" => a.force = true,
-            "--check" => a.check = true,
-            x => a.petsc.push(x.into()),
+
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Restart {
+    /// The newest checkpoint in the results directory.
+    Last,
+    File(PathBuf),
+}
+
+const USAGE: &str = "mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out DIR] \
+     [--check] [--restart FILE|last] [--force] [PETSc options]";
+
+/// Distributed material point method: runs the analysis that INPUT.toml describes.
+#[derive(Debug, Parser)]
+#[command(
+    name = "mpm-par",
+    version,
+    disable_help_flag = true,
+    disable_version_flag = true,
+    override_usage = USAGE,
+    after_help = "Words with one dash, and their values, go to PETSc: -qs_ for equilibrium, -mass_ for mass solves.\nExit codes: 0 done, 1 the run failed, 2 bad input, 3 restart or file problem, 4 environment."
+)]
+struct Words {
+    /// The deck
+    #[arg(value_name = "INPUT.toml")]
+    input: PathBuf,
+    /// Change a key of the deck by its dotted path; the value is TOML
+    #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
+    set: Vec<String>,
+    /// Results directory (default: out/<deck file stem>)
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Validate, build, print the plan; run nothing
+    #[arg(long)]
+    check: bool,
+    /// Continue from a checkpoint
+    #[arg(long, value_name = "FILE|last")]
+    restart: Option<PathBuf>,
+    /// Overwrite existing results
+    #[arg(long)]
+    force: bool,
+    /// Print help
+    #[arg(long, action = clap::ArgAction::Help)]
+    help: Option<bool>,
+    /// Print version
+    #[arg(long, action = clap::ArgAction::Version)]
+    version: Option<bool>,
+}
+
+/// Options of ours that take the next word.
+const WITH_VALUE: [&str; 3] = ["--set", "--out", "--restart"];
+
+/// Reads the command line; the first word is the program's name. Error: bad usage, with the
+/// usage text.
+pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Arguments> {
+    let (ours, petsc) = divide(args)?;
+    let words = match Words::try_parse_from(ours) {
+        Ok(words) => words,
+        Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            return Ok(Arguments { print: Some(e.to_string()), ..Arguments::default() });
         }
-        i += 1;
+        Err(e) => return Err(Error::Input(bad_usage(&e.to_string()))),
+    };
+    let out = words.out.unwrap_or_else(|| default_out(&words.input));
+    let restart = words.restart.map(|file| match file.to_str() {
+        Some("last") => Restart::Last,
+        _ => Restart::File(file),
+    });
+    Ok(Arguments {
+        print: None,
+        input: words.input,
+        sets: words.set,
+        out,
+        check: words.check,
+        restart,
+        force: words.force,
+        petsc,
+    })
+}
+
+/// clap's message, always with the usage.
+fn bad_usage(message: &str) -> String {
+    let message = message.strip_prefix("error: ").unwrap_or(message).trim_end();
+    if message.contains("Usage: ") {
+        return message.to_string();
     }
-    Ok(a)
+    format!("{message}\n\nUsage: {USAGE}")
+}
+
+fn default_out(input: &Path) -> PathBuf {
+    Path::new("out").join(input.file_stem().unwrap_or(input.as_os_str()))
+}
+
+/// Splits our words from PETSc's. A word after a PETSc option is that option's value, unless it
+/// is an option itself or ends in `.toml` while no deck has been named.
+fn divide(args: impl IntoIterator<Item = OsString>) -> Result<(Vec<OsString>, Vec<String>)> {
+    let mut args = args.into_iter();
+    let mut ours: Vec<OsString> = args.next().into_iter().collect();
+    let mut petsc: Vec<String> = Vec::new();
+    let mut after_petsc_option = false;
+    let mut deck_named = false;
+    while let Some(word) = args.next() {
+        let text = word.to_string_lossy().into_owned();
+        if text.starts_with("--") {
+            let takes_next = WITH_VALUE.contains(&text.as_str());
+            ours.push(word);
+            ours.extend(takes_next.then(|| args.next()).flatten());
+            after_petsc_option = false;
+        } else if is_option(&text) {
+            petsc.push(unicode(word)?);
+            after_petsc_option = true;
+        } else if after_petsc_option && (deck_named || !text.ends_with(".toml")) {
+            petsc.push(unicode(word)?);
+            after_petsc_option = false;
+        } else {
+            ours.push(word);
+            deck_named = true;
+            after_petsc_option = false;
+        }
+    }
+    Ok((ours, petsc))
+}
+
+/// One dash and a letter or underscore: not a negative number.
+fn is_option(word: &str) -> bool {
+    let mut letters = word.chars();
+    letters.next() == Some('-')
+        && letters.next().is_some_and(|c| c.is_alphabetic() || c == '_')
+        && word.parse::<f64>().is_err()
+}
+
+fn unicode(word: OsString) -> Result<String> {
+    word.into_string().map_err(|word| {
+        Error::Input(format!("PETSc options must be Unicode, found {}", word.to_string_lossy()))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(line: &str) -> Result<Arguments> {
+        parse(std::iter::once("mpm-par").chain(line.split_whitespace()).map(OsString::from))
+    }
+
+    #[test]
+    fn everything_has_its_place() {
+        let a = read(
+            "inputs/beam.toml --set method.basis=gimp --set body.0.points_per_cell=[3,3] --out here \
+             --check --restart last --force -qs_ksp_type cg -log_view -shift -1e-3 -a -inf -b .5",
+        )
+        .expect("valid");
+        assert_eq!(a.input, Path::new("inputs/beam.toml"));
+        assert_eq!(a.sets, ["method.basis=gimp", "body.0.points_per_cell=[3,3]"]);
+        assert_eq!(a.out, Path::new("here"));
+        assert!(a.check && a.force && a.print.is_none());
+        assert_eq!(a.restart, Some(Restart::Last));
+        let petsc =
+            ["-qs_ksp_type", "cg", "-log_view", "-shift", "-1e-3", "-a", "-inf", "-b", ".5"];
+        assert_eq!(a.petsc, petsc);
+    }
+
+    #[test]
+    fn order_does_not_matter() {
+        for line in [
+            "-log_view deck.toml --set=a=-1 -x 1",
+            "--set a=-1 -log_view --force deck.toml -x 1",
+            "deck.toml -log_view -x 1 --set a=-1",
+        ] {
+            let a = read(line).expect(line);
+            assert_eq!(a.input, Path::new("deck.toml"), "{line}");
+            assert_eq!(a.sets, ["a=-1"], "{line}");
+            assert_eq!(a.petsc, ["-log_view", "-x", "1"], "{line}");
+            assert_eq!(a.out, Path::new("out/deck"), "{line}");
+        }
+        let a = read("deck.toml -options_file other.toml --restart out/deck/checkpoint-3.h5");
+        let a = a.expect("valid");
+        assert_eq!(a.petsc, ["-options_file", "other.toml"]);
+        assert_eq!(a.restart, Some(Restart::File("out/deck/checkpoint-3.h5".into())));
+    }
+
+    #[test]
+    fn bad_usage_is_bad_input() {
+        for (line, part) in [
+            ("", "INPUT.toml"),
+            ("deck.toml --sett a=1", "--set"),
+            ("deck.toml other.toml", "other.toml"),
+            ("deck.toml --set", "--set <KEY=VALUE>"),
+            ("deck.toml --out a --out b", "--out"),
+        ] {
+            let error = read(line).expect_err(line);
+            assert_eq!(error.exit_code(), 2);
+            let text = error.to_string();
+            assert!(text.contains(part) && text.contains("Usage: mpirun -n N mpm-par"), "{text}");
+        }
+    }
+
+    #[test]
+    fn help_and_version_are_texts_to_print() {
+        let help = read("--help").expect("valid").print.expect("text");
+        assert!(help.contains("--restart <FILE|last>") && help.contains("Exit codes: 0 done"));
+        let version = read("--version").expect("valid").print.expect("text");
+        assert_eq!(version.trim_end(), concat!("mpm-par ", env!("CARGO_PKG_VERSION")));
+        // PETSc has a help of its own.
+        assert_eq!(read("deck.toml -help").expect("valid").petsc, ["-help"]);
+    }
 }

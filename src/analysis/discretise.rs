@@ -1,9 +1,11 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
+use crate::assembly::manufactured::Manufactured;
 use crate::assembly::numbering::Touched;
 use crate::assembly::{Numbering, Pattern, Populated, pattern};
 use crate::basis::{self, Groups, Influences};
 use crate::deck::Deck;
+use crate::deck::model::Basis;
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
@@ -21,6 +23,8 @@ pub struct Model<const D: usize> {
     pub materials: Vec<Material>,
     /// One per body.
     pub penalties: Vec<Penalty>,
+    /// The field of a `manufactured` load with its derivatives.
+    pub manufactured: Option<Manufactured>,
 }
 
 /// Everything a step needs that depends on where the points are at its start.
@@ -36,6 +40,9 @@ pub struct Discretisation<const D: usize> {
     pub pattern: Pattern,
     /// Sum of basis weights at each local node, over all ranks.
     pub node_weight: Vec<f64>,
+    /// How firmly each local node holds material: the weight, and for `mpm` the size of the
+    /// gradients too, which is finite where a point on a cell's edge has no weight.
+    pub node_grip: Vec<f64>,
     /// Local nodes that a Ghost face stabilises.
     pub on_face: Vec<bool>,
     /// Cells of the faces owned here.
@@ -69,17 +76,21 @@ impl<const D: usize> Discretisation<D> {
         let (of_groups, of_faces) = pattern.supports.items.split_at(groups.nodes.len());
         let group_nodes = of_groups.to_vec();
         let mut node_weight = vec![0.0; numbering.len()];
+        let mut node_grip = vec![0.0; numbering.len()];
+        let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
         for (p, &group) in groups.group_of_point.iter().enumerate() {
-            let nodes = pattern.supports.list(group);
-            for (&node, weight) in nodes.iter().zip(&influences.weights[influences.row(p)]) {
+            for (&node, entry) in pattern.supports.list(group).iter().zip(influences.row(p)) {
+                let weight = influences.weights[entry];
+                let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
                 node_weight[node as usize] += weight;
+                node_grip[node as usize] += weight.abs() + reach * slope;
             }
         }
         let mut on_face = vec![0.0; numbering.len()];
         for &node in of_faces {
             on_face[node as usize] = 1.0;
         }
-        for field in [&mut node_weight, &mut on_face] {
+        for field in [&mut node_weight, &mut node_grip, &mut on_face] {
             numbering.halo.reverse_add(world, field, 1)?;
             numbering.halo.forward(world, field, 1)?;
         }
@@ -92,19 +103,20 @@ impl<const D: usize> Discretisation<D> {
             numbering,
             pattern,
             node_weight,
+            node_grip,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
         })
     }
 
-    /// Local nodes that carry no equation of their own: their summed weight is at most
+    /// Local nodes that carry no equation of their own: their grip on the material is at most
     /// `threshold` times the largest one, and no Ghost face holds them. Collective.
     pub fn nodes_left_out(&self, world: &World, threshold: f64) -> Vec<bool> {
-        let largest = world.max(self.node_weight.iter().copied().fold(0.0, f64::max));
-        self.node_weight
+        let largest = world.max(self.node_grip.iter().copied().fold(0.0, f64::max));
+        self.node_grip
             .iter()
             .zip(&self.on_face)
-            .map(|(&weight, &on_face)| !on_face && weight <= threshold * largest)
+            .map(|(&grip, &on_face)| !on_face && grip <= threshold * largest)
             .collect()
     }
 }

@@ -1,11 +1,12 @@
 //! From the command line to a finished results directory: what happens on every rank.
 
 use std::collections::BTreeMap;
+use std::ffi::OsString;
 
 use mpi::environment::Universe;
 use mpi::traits::*;
 
-use crate::cli::Arguments;
+use crate::cli::{self, Arguments};
 use crate::deck::model::AnalysisType;
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
@@ -22,14 +23,25 @@ use super::quasi_static;
 use super::recorder::{Ending, Recorder};
 use super::{plan, setup};
 
-/// Runs the program after its command line was read; the exit code is the same on all ranks.
-pub fn run(arguments: &Arguments) -> i32 {
+/// Runs the program with the words of its command line (the program's name first); returns the
+/// exit code, the same on all ranks.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();
     };
+    session::install_panic_hook();
     let world = World::new(universe.world().duplicate());
-    match with_world(&universe, &world, arguments) {
+    let outcome = cli::parse(words).and_then(|arguments| match &arguments.print {
+        Some(text) => {
+            if world.is_root() {
+                println!("{}", text.trim_end());
+            }
+            Ok(())
+        }
+        None => with_world(&universe, &world, &arguments),
+    });
+    match outcome {
         Ok(()) => 0,
         Err(error) => {
             if world.is_root() {

@@ -78,12 +78,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     ) -> Result<Self> {
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let mut held = conditions.fixed.clone();
-        let mut increment = conditions.increment.clone();
+        let increment = conditions.increment.clone();
         for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {
-            for component in 0..D {
-                held[local * D + component] = true;
-                increment[local * D + component] = 0.0;
-            }
+            // A prescribed motion stays: the gradient may see a node whose weight vanishes.
+            held[local * D..(local + 1) * D].fill(true);
         }
         let owned = numbering.owned * D;
         let held_rows = HeldRows {

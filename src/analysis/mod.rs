@@ -8,16 +8,20 @@
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
+//! | the mesh between steps | `motion.rs` | Rotation §2 (viii) |
+//! | migrate, and a new partition where it pays | `balance.rs` | |
 //! | cut and grow load steps | `stepping.rs` | |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
 //! | a run from command line to results | `driver.rs`, `plan.rs` | |
 //! | rows, frames, summary | `recorder.rs`, `clock.rs` | |
 
+pub mod balance;
 pub mod clock;
 pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
+pub mod motion;
 pub mod plan;
 pub mod quasi_static;
 pub mod reactions;

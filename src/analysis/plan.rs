@@ -8,8 +8,8 @@ use crate::output::report::Plan;
 use crate::parallel::World;
 use crate::points::Points;
 
+use super::balance::imbalance;
 use super::discretise::Model;
-use super::quasi_static::imbalance;
 
 /// Counts the first step's system without building it. Collective.
 pub fn of<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Plan> {

@@ -7,19 +7,21 @@ use crate::assembly::external::{map_forces, point_forces};
 use crate::assembly::internal::StepPoints;
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
-use crate::parallel::{World, migrate};
+use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
+use super::balance::{self, imbalance};
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, NewtonSettings};
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
-use super::{solver, update, verify};
+use super::{motion, solver, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -39,10 +41,13 @@ pub fn run<const D: usize>(
         let number = stepping.step_number();
         match solve_step(world, model, points, recorder, clock, span, number)? {
             Ok(solved) => {
-                clock.time(Phase::Migrate, || {
-                    migrate(world, &model.partition, &model.grid, points).map(drop)
-                })?;
                 let ended = stepping.accept();
+                let frame_due = ended
+                    && recorder.wants_frame(
+                        number,
+                        span.factor_end,
+                        stepping.next_span().is_none(),
+                    );
                 recorder.steps_completed = stepping.completed();
                 let mut row = solved.row;
                 totals.work += row.work_external;
@@ -52,8 +57,7 @@ pub fn run<const D: usize>(
                 row.wall_seconds = clock.elapsed();
                 clock.time(Phase::Output, || {
                     recorder.step(world, &row, true)?;
-                    let last = stepping.next_span().is_none();
-                    if ended && recorder.wants_frame(number, span.factor_end, last) {
+                    if frame_due {
                         recorder.frame(world, number, span.factor_end, points)?;
                         recorder.grid_frame(
                             world,
@@ -67,6 +71,10 @@ pub fn run<const D: usize>(
                     }
                     Ok(())
                 })?;
+                if let Some(grid) = solved.moved_grid {
+                    model.grid = grid;
+                }
+                clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
             }
             Err(why) => {
                 recorder.log.say(&format!("step {number} refused: {why}"));
@@ -98,6 +106,8 @@ struct Solved<const D: usize> {
     mesh: Discretisation<D>,
     displacement: Vec<f64>,
     reaction: Vec<f64>,
+    /// The mesh where it goes after the step, if it moves.
+    moved_grid: Option<Grid<D>>,
 }
 
 /// One load step from `span.factor_start` to `factor_end`. The inner `Err` says why the step is
@@ -127,7 +137,16 @@ fn solve_step<const D: usize>(
     })?;
     let numbering = &mesh.numbering;
     let external = |factor: f64, time: f64| -> Result<Vec<f64>> {
-        let forces = point_forces(points, &deck.loads, AnalysisType::QuasiStatic, factor, time);
+        let forces = point_forces(
+            points,
+            &model.materials,
+            &deck.loads,
+            model.manufactured.as_ref(),
+            AnalysisType::QuasiStatic,
+            factor,
+            time,
+        );
+        let forces = world.fail_together(forces)?;
         owned_forces(world, numbering, &mesh, &forces)
     };
     let external_start = external(span.factor_start, span.time_start)?;
@@ -185,7 +204,13 @@ fn solve_step<const D: usize>(
     drop(problem);
 
     let made = update::increments(step, &displacement);
-    if let Some(why) = update::reason_to_refuse(world, &model.grid, points, &made, true) {
+    let moved_grid = match motion::moved(world, deck, &model.grid, numbering, &displacement, span)?
+    {
+        Ok(moved_grid) => moved_grid,
+        Err(why) => return Ok(Err(why)),
+    };
+    let grid_after = moved_grid.as_ref().unwrap_or(&model.grid);
+    if let Some(why) = update::reason_to_refuse(world, grid_after, points, &made) {
         return Ok(Err(why));
     }
     let work = work_of_step::<D>(
@@ -239,7 +264,7 @@ fn solve_step<const D: usize>(
         imbalance: imbalance(world, points.len()),
         ..HistoryRow::default()
     };
-    Ok(Ok(Solved { row, mesh, displacement, reaction }))
+    Ok(Ok(Solved { row, mesh, displacement, reaction, moved_grid }))
 }
 
 /// Nodal external force of the owned degrees of freedom. Collective.
@@ -270,13 +295,6 @@ fn work_of_step<const D: usize>(
             0.5 * (side[0][dof] + side[1][dof]) * displacement[dof]
         })
         .sum()
-}
-
-/// Largest over mean number of points per rank.
-pub fn imbalance(world: &World, points: usize) -> f64 {
-    let total = world.sum_usize(points);
-    let largest = world.max_usize(points);
-    if total == 0 { 1.0 } else { largest as f64 * world.size() as f64 / total as f64 }
 }
 
 /// Figures of merit at the end of the run. Collective.

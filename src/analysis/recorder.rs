@@ -5,9 +5,8 @@ use std::path::PathBuf;
 
 use crate::assembly::Numbering;
 use crate::deck::Deck;
-use crate::deck::model::{Element, Every};
+use crate::deck::model::Every;
 use crate::error::Result;
-use crate::grid::Grid;
 use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
 use crate::output::log::Log;
@@ -181,7 +180,7 @@ impl Recorder {
             }
         }
         let frame = GridFrame {
-            element: element_of(&model.grid),
+            element: model.grid.element(),
             coordinates: &coordinates,
             connectivity: &connectivity,
             displacement_increment: &per_node(&displacement[..owned * D]),
@@ -225,14 +224,5 @@ impl Recorder {
         };
         summary.write(&self.directory, world.comm())?;
         Ok(summary)
-    }
-}
-
-fn element_of<const D: usize>(grid: &Grid<D>) -> Element {
-    match grid {
-        Grid::Lattice(_) if D == 2 => Element::Quad4,
-        Grid::Lattice(_) => Element::Hex8,
-        #[allow(unreachable_patterns)]
-        _ => Element::Quad4,
     }
 }

@@ -1,10 +1,11 @@
 //! From a checked deck to points on their ranks: seed, partition, migrate, place point forces.
 
+use crate::assembly::manufactured::Manufactured;
 use crate::deck::Deck;
 use crate::deck::model::{self, Load};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
-use crate::grid::{Grid, Lattice};
+use crate::grid::{Grid, Lattice, Mesh};
 use crate::material::Material;
 use crate::parallel::{self, Partition, World};
 use crate::points::Points;
@@ -14,7 +15,7 @@ use super::discretise::Model;
 
 /// Builds the model and this rank's points. Collective.
 pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {
-    let grid = build_grid(&deck)?;
+    let grid = world.fail_together(build_grid(&deck))?;
     let share = Share { rank: world.rank(), ranks: world.size() };
     let mut points = world.fail_together(seed::seed(&deck, &grid, share))?;
     check_bodies(world, &deck, &grid, &points)?;
@@ -37,7 +38,12 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
             })
         })
         .collect();
-    Ok((Model { deck, grid, partition, materials, penalties }, points))
+    let field = deck.loads.iter().find_map(|load| match load {
+        Load::Manufactured(field) => Some(field),
+        _ => None,
+    });
+    let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
+    Ok((Model { deck, grid, partition, materials, penalties, manufactured }, points))
 }
 
 fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
@@ -50,7 +56,7 @@ fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
                 cells: std::array::from_fn(|a| lattice.cells[a]),
             }))
         }
-        model::Grid::Mesh(_) => Err(Error::Input("meshes are not wired yet".into())),
+        model::Grid::Mesh(mesh) => Ok(Grid::Mesh(Mesh::build(&mesh.source)?)),
     }
 }
 

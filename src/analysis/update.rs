@@ -62,13 +62,12 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
 }
 
 /// Says why the increments cannot be accepted, if so: a NaN, an inverted point, a point outside
-/// the grid. The answer is the same on every rank. Collective.
+/// the grid (as it is after the step). The answer is the same on every rank. Collective.
 pub fn reason_to_refuse<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     points: &Points<D>,
     increments: &Increments<D>,
-    check_grid: bool,
 ) -> Option<String> {
     let mut reason = None;
     for p in 0..points.len() {
@@ -79,7 +78,7 @@ pub fn reason_to_refuse<const D: usize>(
             "has a displacement that is not finite".to_string()
         } else if determinant <= 0.0 {
             format!("is turned inside out (det dF = {determinant:.3e})")
-        } else if check_grid && grid.locate(&moved).is_none() {
+        } else if grid.locate(&moved).is_none() {
             format!("leaves the grid: it would move to {moved:?}")
         } else {
             continue;

@@ -57,7 +57,7 @@ impl Conditions {
                     held[component] = Some(0.0);
                 }
                 for (component, expression) in &boundary.displacement {
-                    let start = grid.node_start(node);
+                    let start = grid.node_position_initial(node);
                     held[*component] = Some(increment_of(expression, &start, span));
                 }
                 if let Some(rotation) = &boundary.rotation {
@@ -118,7 +118,7 @@ fn members<const D: usize>(
                 .nodes
                 .iter()
                 .map(|&node| {
-                    let x = grid.node_start(node);
+                    let x = grid.node_position_initial(node);
                     (0..D).all(|a| x[a] >= min[a] - slack && x[a] <= max[a] + slack)
                 })
                 .collect())

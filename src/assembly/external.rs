@@ -4,19 +4,24 @@
 use crate::basis::Influences;
 use crate::deck::Scope;
 use crate::deck::model::{AnalysisType, Load};
+use crate::error::Result;
+use crate::material::Material;
 use crate::points::Points;
 
 use super::Numbering;
+use super::manufactured::Manufactured;
 
 /// Force on each point, N, at load factor `s` and time `t`. In quasi-static runs loads grow with
 /// the load factor unless an expression holds `s` or `t` itself.
 pub fn point_forces<const D: usize>(
     points: &Points<D>,
+    materials: &[Material],
     loads: &[Load],
+    manufactured: Option<&Manufactured>,
     kind: AnalysisType,
     load_factor: f64,
     time: f64,
-) -> Vec<[f64; D]> {
+) -> Result<Vec<[f64; D]>> {
     let ramp = if kind == AnalysisType::QuasiStatic { load_factor } else { 1.0 };
     let mut forces: Vec<[f64; D]> =
         points.point_force.iter().map(|force| force.map(|f| f * ramp)).collect();
@@ -39,10 +44,20 @@ pub fn point_forces<const D: usize>(
                     }
                 }
             }
-            Load::Manufactured(_) => {}
+            Load::Manufactured(_) => {
+                let Some(manufactured) = manufactured else { continue };
+                for (p, force) in forces.iter_mut().enumerate() {
+                    let scope = scope_of(points, p, load_factor, time);
+                    let material = &materials[points.body[p] as usize];
+                    let made: [f64; D] = manufactured.force(material, &scope)?;
+                    for (f, b) in force.iter_mut().zip(made) {
+                        *f += b * points.volume_initial[p];
+                    }
+                }
+            }
         }
     }
-    forces
+    Ok(forces)
 }
 
 /// Variables of an expression at a point.

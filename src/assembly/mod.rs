@@ -13,6 +13,7 @@
 //! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
+//! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 
 pub mod conditions;
@@ -20,6 +21,7 @@ pub mod external;
 pub mod graph;
 pub mod internal;
 mod kernel;
+pub mod manufactured;
 pub mod node_index;
 pub mod numbering;
 pub mod pattern;

@@ -42,7 +42,17 @@ pub fn update_domains<const D: usize>(
     increments: &[Matrix3<f64>],
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<()> {
+    if basis == Basis::Cpdi2 {
+        super::cpdi2::update_corners(grid, points, displacement)?;
+    }
     if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
+        for p in 0..points.len() {
+            let corners = match basis {
+                Basis::Cpdi1 => super::cpdi1::corner_positions(points, p),
+                _ => points.corners[p],
+            };
+            points.half_length[p] = half_extent(&corners);
+        }
         return Ok(());
     }
     assert_eq!(increments.len(), points.len(), "one increment for each point");
@@ -190,6 +200,14 @@ fn collapsed<const D: usize>(
         points.position[p],
         gradient.determinant(),
     ))
+}
+
+/// Half the extent of a CPDI domain along each axis, for extents of bodies only.
+fn half_extent<const D: usize>(corners: &[[f64; D]; 8]) -> [f64; D] {
+    std::array::from_fn(|axis| {
+        let along = || corners[..1 << D].iter().map(|x| x[axis]);
+        0.5 * (along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min))
+    })
 }
 
 #[cfg(test)]

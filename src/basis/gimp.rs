@@ -2,8 +2,9 @@
 //!
 //! The mean of a hat function over an interval is summed cell by cell, where the hat is linear:
 //! the share of the domain in the cell times the hat at the middle of that piece. This is exact
-//! for any half length and free of cancellation. Parts beyond the grid find no nodes: there the
-//! weights sum to less than one.
+//! for any half length and free of cancellation. The hats of the grid's outermost nodes reach one
+//! cell beyond its edge, as the formula says: a domain that sticks out keeps most of its weight
+//! (Lagrangian Table 7 depends on it), though no longer a sum of one.
 //!
 //! A cell is populated when it is overlapped by more than [`LINE_TOLERANCE`] of its size on
 //! each axis; one that is only touched, or overlapped by round-off, is not. The cell that holds
@@ -107,16 +108,24 @@ fn fill(line: &mut Line, span: Span, centre: f64, reach: f64, cells: usize, spac
     let last = span.last - span.first;
     line.reset(span.first, last + 2);
     // Distances are taken from the span's first node, so large grids cost no digits. The
-    // outermost pieces end where the domain ends, or at the grid's edge: an end that only
-    // round-off parts from a grid line continues the hat's straight line.
+    // outermost pieces end where the domain ends: an end that only round-off parts from a grid
+    // line continues the hat's straight line.
     let offset = centre - span.first as f64;
     let (mut low, mut high) = (offset - reach, offset + reach);
     let per_length = 1.0 / (high - low);
+    let edge = (last + 1) as f64;
+    // Beyond the grid's edge the outer halves of the outermost nodes' hats count on.
     if span.first == 0 && low < -LINE_TOLERANCE {
+        let share = low.max(-1.0).abs() * per_length;
+        line.weights[0] += share * (1.0 + 0.5 * low.max(-1.0));
+        line.slopes[0] += share / spacing;
         low = 0.0;
     }
-    let edge = (last + 1) as f64;
     if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
+        let beyond = (high - edge).min(1.0);
+        let share = beyond * per_length;
+        line.weights[last + 1] += share * (1.0 - 0.5 * beyond);
+        line.slopes[last + 1] -= share / spacing;
         high = edge;
     }
     for cell in 0..=last {

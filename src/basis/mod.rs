@@ -6,6 +6,7 @@
 //! | `gimp` | `gimp.rs` | Ghost §2.5, after Bardenhagen and Kober |
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
+//! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
@@ -21,6 +22,13 @@ mod tests;
 
 pub use domain::update_domains;
 pub use groups::Groups;
+
+pub mod corner;
+pub mod cpdi1;
+pub mod cpdi2;
+pub mod row;
+
+pub use row::Row;
 
 use crate::deck::model::Basis;
 use crate::error::{Error, Result};
@@ -95,7 +103,8 @@ pub fn map_points<const D: usize>(
     match basis {
         Basis::Mpm => mpm::map_points(grid, points),
         Basis::Gimp => gimp::map_points(grid, points),
-        Basis::Cpdi1 | Basis::Cpdi2 => Err(unavailable(basis)),
+        Basis::Cpdi1 => row::map_points(points, |p, row| cpdi1::influence(grid, points, p, row)),
+        Basis::Cpdi2 => row::map_points(points, |p, row| cpdi2::influence(grid, points, p, row)),
     }
 }
 
@@ -111,26 +120,26 @@ pub fn populated_cells<const D: usize>(
     match basis {
         Basis::Mpm => mpm::populated_cells(grid, points, p, out),
         Basis::Gimp => gimp::populated_cells(grid, points, p, out),
-        Basis::Cpdi1 | Basis::Cpdi2 => Err(unavailable(basis)),
+        Basis::Cpdi1 => cpdi1::populated_cells(grid, points, p, out),
+        Basis::Cpdi2 => cpdi2::populated_cells(grid, points, p, out),
     }
-}
-
-fn unavailable(basis: Basis) -> Error {
-    Error::Input(format!("method.basis = {basis:?} is not available; use mpm or gimp"))
 }
 
 /// The lattice that `gimp` needs under its axis-aligned domains.
 pub(crate) fn lattice_of<const D: usize>(grid: &Grid<D>) -> Result<&Lattice<D>> {
     match grid {
         Grid::Lattice(lattice) => Ok(lattice),
+        Grid::Mesh(mesh) => Err(Error::Input(format!(
+            "{}: basis gimp needs a lattice under its axis-aligned domains; use mpm, cpdi1 or \
+             cpdi2 on a mesh",
+            mesh.name
+        ))),
     }
 }
 
 /// The error for a point whose position `x` is in no cell.
 pub(crate) fn outside<const D: usize>(grid: &Grid<D>, points: &Points<D>, p: usize) -> Error {
-    let (low, high) = match grid {
-        Grid::Lattice(lattice) => (lattice.origin, lattice.node_position(lattice.node_count() - 1)),
-    };
+    let (low, high) = grid.bounds();
     Error::Run(format!(
         "point {} of body {} is at {:?} m, outside the grid, which spans {low:?} to {high:?} m; \
          enlarge the grid or look for what drove the point away",

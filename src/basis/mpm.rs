@@ -4,9 +4,10 @@
 //! of its cell, also those with weight zero.
 
 use super::product::{Line, push_row};
-use super::{Influences, outside};
+use super::{Influences, outside, row};
 use crate::error::Result;
 use crate::grid::Grid;
+use crate::grid::locate::REACH;
 use crate::points::Points;
 
 pub(super) fn map_points<const D: usize>(
@@ -32,8 +33,23 @@ pub(super) fn map_points<const D: usize>(
                 push_row(lattice, &lines, &mut influences);
             }
         }
+        Grid::Mesh(_) => return map_points_on_mesh(grid, points),
     }
     Ok(influences)
+}
+
+/// On a mesh the reference coordinates come from the inverse map of the cell.
+fn map_points_on_mesh<const D: usize>(grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+    let mut hint = None;
+    row::map_points(points, |p, row| {
+        let x = &points.position[p];
+        let at = grid.interpolate(x, REACH, hint).ok_or_else(|| outside(grid, points, p))?;
+        hint = Some(at.cell);
+        row.clear();
+        row.add_place(&at);
+        row.merge();
+        Ok(())
+    })
 }
 
 pub(super) fn populated_cells<const D: usize>(

@@ -3,28 +3,55 @@
 /// How many numbers a field has at a point, and how its components are called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FieldRank {
+    /// A whole number: written, not compared.
+    Integer,
     Scalar,
     /// Components x, y, z.
     Vector,
-    /// Components xx, yy, zz, xy, yz, xz.
+    /// Symmetric: components xx, xy, xz, yy, yz, zz.
+    Symmetric,
+    /// All nine components.
     Tensor,
 }
 
+impl FieldRank {
+    /// Names of the components in `dimension` dimensions; tensors always have three axes.
+    pub fn components(self, dimension: usize) -> &'static [&'static str] {
+        match self {
+            FieldRank::Integer | FieldRank::Scalar => &[],
+            FieldRank::Vector => &["x", "y", "z"][..dimension],
+            FieldRank::Symmetric => &["xx", "xy", "xz", "yy", "yz", "zz"],
+            FieldRank::Tensor => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
+        }
+    }
+}
+
 /// Fields that can be written; scalars, vector fields and components can be verified.
-pub const FIELDS: [(&str, FieldRank); 12] = [
+pub const FIELDS: [(&str, FieldRank); 22] = [
     ("displacement", FieldRank::Vector),
+    ("position", FieldRank::Vector),
+    ("position_initial", FieldRank::Vector),
     ("velocity", FieldRank::Vector),
     ("acceleration", FieldRank::Vector),
     // Cauchy
-    ("stress", FieldRank::Tensor),
-    ("kirchhoff_stress", FieldRank::Tensor),
-    ("deformation_gradient", FieldRank::Tensor),
-    ("J", FieldRank::Scalar),
+    ("stress", FieldRank::Symmetric),
+    ("kirchhoff_stress", FieldRank::Symmetric),
+    ("pressure", FieldRank::Scalar),
+    ("von_mises", FieldRank::Scalar),
+    // sqrt(2 J2) of the Kirchhoff stress
+    ("deviatoric_radius", FieldRank::Scalar),
     ("plastic_strain", FieldRank::Scalar),
     ("dissipation", FieldRank::Scalar),
+    ("deformation_gradient", FieldRank::Tensor),
+    ("elastic_left_cauchy_green", FieldRank::Symmetric),
+    ("J", FieldRank::Scalar),
     ("volume", FieldRank::Scalar),
     ("mass", FieldRank::Scalar),
     ("half_length", FieldRank::Vector),
+    ("point_force", FieldRank::Vector),
+    ("id", FieldRank::Integer),
+    ("body", FieldRank::Integer),
+    ("rank", FieldRank::Integer),
 ];
 
 /// The names alone.
@@ -37,5 +64,3 @@ pub const FIELD_NAMES: &[&str] = &{
     }
     names
 };
-
-pub const TENSOR_COMPONENTS: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "xz"];

@@ -88,7 +88,7 @@ pub struct Method {
     /// `velocity_update = "xpic"` with `xpic_order = m`; `None` otherwise.
     pub xpic: Option<usize>,
     /// A node whose summed basis weight is below this fraction of the largest one is held at
-    /// zero and left out of the residual (default 1e-8 without Ghost stiffness, 0 with it).
+    /// zero and left out of the residual (default 1e-12 without Ghost stiffness, 0 with it).
     pub drop_below: f64,
 }
 
@@ -259,7 +259,7 @@ pub enum BodySource {
         shape: Shape,
         seeding: Seeding,
     },
-    /// csv with header x,y[,z],volume[,vx,vy,vz]; path already joined to the deck's folder.
+    /// csv with header `x,y[,z],volume[,vx,vy,vz]`; path already joined to the deck's folder.
     File(PathBuf),
     /// All cells of a mesh, or those with this physical tag.
     MeshCells {

@@ -139,6 +139,9 @@ pub fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Opti
             (if prefix { distance.min(1) } else { distance }, candidate)
         })
         .min_by_key(|(distance, _)| *distance)
-        .filter(|(distance, candidate)| *distance <= (candidate.len().max(name.len()) / 3).max(1))
+        .filter(|(distance, candidate)| {
+            let length = candidate.len().max(name.len());
+            *distance < length && *distance <= (length / 3).max(1)
+        })
         .map(|(_, candidate)| candidate)
 }

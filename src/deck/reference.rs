@@ -1,1 +1,102 @@
+//! The schema as documentation: `docs/deck.md` is this text.
 
+use super::expression;
+use super::fields::FIELDS;
+use super::schema::{self, Kind, Need, Section};
+
+/// A complete deck, which a test reads.
+pub const EXAMPLE: &str = include_str!("example.toml");
+
+const INTRODUCTION: &str = "\
+# The deck
+
+A deck is a TOML file that says everything about an analysis. Units are SI. In plane strain
+(2D) volumes, masses and forces are per metre of thickness. An unknown key, a wrong type and a
+value out of range are errors that name the file, line and column, what is accepted, and the
+nearest known name. The deck with every default is written beside the results as
+`resolved.toml`.
+
+This page is written from the schema in `src/deck/schema/`; a test keeps it so
+(`UPDATE_DOCS=1 cargo test --test deck_reference` writes it anew).
+";
+
+const OPTIONS: &str = "\
+## Changes from the command line
+
+`--set KEY=VALUE` changes any key by its dotted path, arrays by index, as in
+`--set method.basis=mpm`, `--set body.0.points_per_cell=[3,3]` or
+`--set grid.generate.annulus.inner=3`. The value is TOML; a word that is not TOML is a string.
+Missing tables on the way are made. `--set ghost=` (no value) removes a key.
+";
+
+/// The reference of all sections and keys, in Markdown.
+pub fn markdown() -> String {
+    let mut out = format!("{INTRODUCTION}\n```toml\n{EXAMPLE}```\n\n{OPTIONS}\n");
+    out.push_str("## Expressions\n\n");
+    out.push_str(
+        "A number, or a string with a formula. `X Y Z` is the position at the start, `x y z` the \
+         current one, `s` the load factor from 0 to 1, `t` the time; each key says which of them \
+         it takes. Powers bind more tightly than signs (`-x^2` is negative), comparisons and \
+         logic give 1 or 0. Known names are\n\n",
+    );
+    for part in expression::vocabulary().split("; ") {
+        out.push_str(&format!("- {}\n", part.replace("||", "`||`")));
+    }
+    out.push_str(&format!("\n{}\n", fields()));
+    for part in schema::sections() {
+        out.push_str(&section(part));
+    }
+    // One empty line at the end would be one too many.
+    out.trim_end().to_string() + "\n"
+}
+
+fn fields() -> String {
+    let mut out = String::from(
+        "## Fields\n\nPoint fields for `output.fields`; `verify.field` takes scalars, components \
+         and whole vectors.\n\n| field | components |\n|---|---|\n",
+    );
+    for (name, rank) in FIELDS {
+        let components: Vec<String> =
+            rank.components(3).iter().map(|c| format!("`.{c}`")).collect();
+        let components = components.join(" ");
+        out.push_str(&format!("| `{name}` | {components} |\n"));
+    }
+    out
+}
+
+fn section(section: &Section) -> String {
+    let title = match section.name {
+        "" => section.header.to_string(),
+        _ => format!("`{}`", section.header),
+    };
+    let mut out = format!(
+        "## {title}\n\n{}\n\n| key | value | unit | default | meaning |\n|---|---|---|---|---|\n",
+        section.doc
+    );
+    for key in section.keys {
+        let range = key.range.describe();
+        let mut value = match key.kind {
+            Kind::Table(other) => format!("table `{}`", schema::section(other).header),
+            Kind::Tables(other) | Kind::Named(other) => {
+                format!("`{}`", schema::section(other).header)
+            }
+            // The list of fields has its own section.
+            Kind::Choices(words) if words.len() == FIELDS.len() => "an array of fields".to_string(),
+            kind => kind.describe(),
+        };
+        if !range.is_empty() {
+            value = format!("{value}, {range}");
+        }
+        let default = match key.need {
+            Need::Required => "required".to_string(),
+            Need::Optional("-") => String::new(),
+            Need::Optional(when) => when.to_string(),
+            Need::Default(text) => format!("`{text}`"),
+        };
+        out.push_str(&format!(
+            "| `{}` | {value} | {} | {default} | {} |\n",
+            key.name, key.unit, key.doc
+        ));
+    }
+    out + "\n"
+}

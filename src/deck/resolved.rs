@@ -1,5 +1,360 @@
 //! The deck with every default, as TOML that reads back to the same deck.
-use super::model::Deck;
-pub fn resolved(_deck: &Deck) -> String {
-    String::new()
+
+use super::expression::Expression;
+use super::model::{
+    BodySource, Deck, Every, Grid, Load, MaterialModel, MeshMotion, MeshSource, Place, Seeding,
+};
+use super::schema::{self, AXES, SIDES};
+use super::shape::{Form, Shape};
+
+/// TOML of `deck` with all defaults. Relative paths have become absolute ones.
+pub fn resolved(deck: &Deck) -> String {
+    let mut w = Writer::default();
+    w.line("", "title", quote(&deck.title));
+    analysis(&mut w, deck);
+    grid(&mut w, deck);
+    materials_and_bodies(&mut w, deck);
+    conditions(&mut w, deck);
+    results(&mut w, deck);
+    w.text
+}
+
+#[derive(Default)]
+struct Writer {
+    text: String,
+}
+
+impl Writer {
+    fn table(&mut self, header: &str) {
+        self.text.push_str(&format!("\n{header}\n"));
+    }
+
+    /// One key of a section of the schema, with its unit.
+    fn line(&mut self, section: &str, key: &str, value: String) {
+        let unit = schema::section(section).key(key).map_or("", |known| known.unit);
+        let unit = if unit.is_empty() { String::new() } else { format!("  # {unit}") };
+        self.text.push_str(&format!("{key} = {value}{unit}\n"));
+    }
+
+    fn optional(&mut self, section: &str, key: &str, value: Option<String>) {
+        if let Some(value) = value {
+            self.line(section, key, value);
+        }
+    }
+}
+
+fn quote(text: &str) -> String {
+    let mut out = String::from("\"");
+    for c in text.chars() {
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            c if c.is_control() => out.push_str(&format!("\\u{:04x}", c as u32)),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}
+
+fn number(value: f64) -> String {
+    format!("{value:?}")
+}
+
+fn array(items: impl IntoIterator<Item = String>) -> String {
+    format!("[{}]", items.into_iter().collect::<Vec<_>>().join(", "))
+}
+
+fn inline(pairs: &[(&str, String)]) -> String {
+    let pairs: Vec<String> = pairs.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+    format!("{{ {} }}", pairs.join(", "))
+}
+
+fn vector(values: &[f64]) -> String {
+    array(values.iter().copied().map(number))
+}
+
+fn counts(values: &[usize]) -> String {
+    array(values.iter().map(usize::to_string))
+}
+
+fn axes(axes: &[usize]) -> String {
+    array(axes.iter().map(|axis| quote(AXES[*axis])))
+}
+
+/// A number if it was given as one.
+fn expression(expression: &Expression) -> String {
+    match expression.as_constant() {
+        Some(value) if value.to_string() == expression.text() => number(value),
+        _ => quote(expression.text()),
+    }
+}
+
+fn expressions(all: &[Expression]) -> String {
+    array(all.iter().map(expression))
+}
+
+fn analysis(w: &mut Writer, deck: &Deck) {
+    let a = &deck.analysis;
+    w.table("[analysis]");
+    w.line("analysis", "type", quote(a.kind.name()));
+    w.optional("analysis", "steps", a.steps.map(|steps| steps.to_string()));
+    w.optional("analysis", "duration", a.duration.map(number));
+    w.optional("analysis", "cfl", a.cfl.map(number));
+    w.line("analysis", "tolerance", number(a.tolerance));
+    w.line("analysis", "max_iterations", a.max_iterations.to_string());
+    w.line("analysis", "on_failure", quote(a.on_failure.name()));
+    w.line("analysis", "smallest_step", number(a.smallest_step));
+    w.line("analysis", "inverted_iterates", quote(a.inverted_iterates.name()));
+    w.line("analysis", "newmark_beta", number(a.newmark_beta));
+    w.line("analysis", "newmark_gamma", number(a.newmark_gamma));
+    w.line("analysis", "hht_alpha", number(a.hht_alpha));
+
+    let m = &deck.method;
+    w.table("[method]");
+    w.line("method", "basis", quote(m.basis.name()));
+    w.line("method", "domain_update", quote(m.domain_update.name()));
+    w.line("method", "frame", quote(m.frame.name()));
+    w.line("method", "mass", quote(m.mass.name()));
+    w.line("method", "stress_update", quote(m.stress_update.name()));
+    let velocity = match (m.xpic, m.flip) {
+        (Some(_), _) => quote("xpic"),
+        (None, 1.0) => quote("flip"),
+        (None, 0.0) => quote("pic"),
+        (None, share) => number(share),
+    };
+    w.line("method", "velocity_update", velocity);
+    w.optional("method", "xpic_order", m.xpic.map(|order| order.to_string()));
+    w.line("method", "drop_below", number(m.drop_below));
+
+    if let Some(g) = &deck.ghost {
+        w.table("[ghost]");
+        w.optional("ghost", "stiffness", g.stiffness.map(number));
+        w.optional("ghost", "stiffness_factor", g.stiffness_factor.map(number));
+        w.optional("ghost", "mass", g.mass.map(number));
+        w.optional("ghost", "mass_factor", g.mass_factor.map(number));
+        w.line("ghost", "scaling", quote(g.scaling.name()));
+    }
+    if let Some(motion) = &deck.conditioning_displacement {
+        w.table("[conditioning]");
+        w.line("conditioning", "displacement", vector(motion));
+    }
+}
+
+fn grid(w: &mut Writer, deck: &Deck) {
+    w.table("[grid]");
+    let mesh = match &deck.grid {
+        Grid::Lattice(lattice) => {
+            w.line("grid", "type", quote("lattice"));
+            w.line("grid", "origin", vector(&lattice.origin));
+            w.line("grid", "cells", counts(&lattice.cells));
+            w.line("grid", "h", vector(&lattice.spacing));
+            return;
+        }
+        Grid::Mesh(mesh) => mesh,
+    };
+    w.line("grid", "type", quote("mesh"));
+    match &mesh.source {
+        MeshSource::File(path) => {
+            w.line("grid", "file", quote(&path.display().to_string()));
+            w.line("grid", "dimension", deck.dimension.to_string());
+        }
+        MeshSource::Annulus { inner, outer, radial, around, element, grading } => {
+            let annulus = inline(&[
+                ("inner", vector(inner)),
+                ("outer", number(*outer)),
+                ("radial", radial.to_string()),
+                ("around", around.to_string()),
+                ("element", quote(element.name())),
+                ("grading", number(*grading)),
+            ]);
+            w.line("grid", "generate", inline(&[("annulus", annulus)]));
+        }
+        MeshSource::Box { min, max, cells, element } => {
+            let made = inline(&[
+                ("min", vector(min)),
+                ("max", vector(max)),
+                ("cells", counts(cells)),
+                ("element", quote(element.name())),
+            ]);
+            w.line("grid", "generate", inline(&[("box", made)]));
+        }
+    }
+    let motion = match &mesh.motion {
+        MeshMotion::Fixed => None,
+        MeshMotion::RotateWith(tag) => Some(("rotate_with", quote(tag))),
+        MeshMotion::Follow(along) => Some(("follow", axes(along))),
+        MeshMotion::Material => Some(("follow", quote("material"))),
+    };
+    w.optional("grid", "motion", motion.map(|motion| inline(&[motion])));
+}
+
+fn materials_and_bodies(w: &mut Writer, deck: &Deck) {
+    for material in &deck.materials {
+        w.table(&format!("[material.{}]", quote(&material.name)));
+        let (model, young, poisson, yield_stress) = match material.model {
+            MaterialModel::Hencky { young, poisson } => ("hencky", young, poisson, None),
+            MaterialModel::VonMises { young, poisson, yield_stress } => {
+                ("von-mises", young, poisson, Some(yield_stress))
+            }
+        };
+        w.line("material", "model", quote(model));
+        w.line("material", "young", number(young));
+        w.line("material", "poisson", number(poisson));
+        w.optional("material", "yield", yield_stress.map(number));
+    }
+    for body in &deck.bodies {
+        w.table("[[body]]");
+        w.line("body", "name", quote(&body.name));
+        w.line("body", "material", quote(&deck.materials[body.material].name));
+        w.line("body", "density", number(body.density));
+        let seeding = match &body.source {
+            BodySource::Shape { shape: region, seeding } => {
+                w.line("body", "shape", shape(region));
+                Some(seeding)
+            }
+            BodySource::File(path) => {
+                let path = quote(&path.display().to_string());
+                w.line("body", "shape", inline(&[("points", path)]));
+                None
+            }
+            BodySource::MeshCells { tag, seeding } => {
+                let tag = quote(tag.as_deref().unwrap_or("all"));
+                w.line("body", "shape", inline(&[("cells", tag)]));
+                Some(seeding)
+            }
+        };
+        match seeding {
+            Some(Seeding::PerCell(per_axis)) => {
+                w.line("body", "points_per_cell", counts(per_axis));
+            }
+            Some(Seeding::Lattice { spacing, offset }) => {
+                let pairs = [("spacing", number(*spacing)), ("offset", vector(offset))];
+                w.line("body", "lattice", inline(&pairs));
+            }
+            Some(Seeding::Gauss(points)) => w.line("body", "gauss", points.to_string()),
+            None => {}
+        }
+        w.line("body", "velocity", expressions(&body.velocity));
+    }
+}
+
+fn shape(region: &Shape) -> String {
+    let set = |parts: &[Shape]| array(parts.iter().map(shape));
+    let mut pairs = vec![match &region.form {
+        Form::Box { min, max } => ("box", inline(&[("min", vector(min)), ("max", vector(max))])),
+        Form::Ball { centre, radius } => {
+            ("disc", inline(&[("centre", vector(centre)), ("radius", number(*radius))]))
+        }
+        Form::Ellipsoid { centre, semi_axes } => {
+            ("ellipse", inline(&[("centre", vector(centre)), ("semi_axes", vector(semi_axes))]))
+        }
+        Form::Capsule { from, to, radius } => (
+            "capsule",
+            inline(&[("from", vector(from)), ("to", vector(to)), ("radius", number(*radius))]),
+        ),
+        Form::Polygon { vertices } => {
+            ("polygon", inline(&[("vertices", array(vertices.iter().map(|v| vector(v))))]))
+        }
+        Form::Where(condition) => ("where", quote(condition.text())),
+        Form::Union(parts) => ("union", set(parts)),
+        Form::Intersection(parts) => ("intersection", set(parts)),
+        Form::Difference(parts) => ("difference", set(parts)),
+    }];
+    if let Some(turn) = &region.placement.rotate {
+        let mut rotate = vec![("degrees", number(turn.degrees)), ("about", vector(&turn.about))];
+        if turn.about.len() == 3 {
+            rotate.push(("axis", vector(&turn.axis)));
+        }
+        pairs.push(("rotate", inline(&rotate)));
+    }
+    if !region.placement.translate.is_empty() {
+        pairs.push(("translate", vector(&region.placement.translate)));
+    }
+    inline(&pairs)
+}
+
+fn conditions(w: &mut Writer, deck: &Deck) {
+    for boundary in &deck.boundaries {
+        w.table("[[boundary]]");
+        w.line("boundary", "name", quote(&boundary.name));
+        let place = match &boundary.place {
+            Place::Side { axis, upper } => ("side", quote(SIDES[2 * axis + usize::from(*upper)])),
+            Place::Box { min, max } => {
+                ("box", inline(&[("min", vector(min)), ("max", vector(max))]))
+            }
+            Place::Tag(tag) => ("tag", quote(tag)),
+            Place::CellsOf { body } => ("cells_of", quote(&deck.bodies[*body].name)),
+        };
+        w.line("boundary", "where", inline(&[place]));
+        w.line("boundary", "fix", axes(&boundary.fix));
+        if !boundary.displacement.is_empty() {
+            let pairs: Vec<(&str, String)> = boundary
+                .displacement
+                .iter()
+                .map(|(axis, e)| (AXES[*axis], expression(e)))
+                .collect();
+            w.line("boundary", "displacement", inline(&pairs));
+        }
+        if let Some(rotation) = &boundary.rotation {
+            let pairs =
+                [("centre", vector(&rotation.centre)), ("degrees", number(rotation.degrees))];
+            w.line("boundary", "rotation", inline(&pairs));
+        }
+    }
+    for load in &deck.loads {
+        w.table("[[load]]");
+        match load {
+            Load::Point { body, nearest, force } => {
+                let point = inline(&[
+                    ("body", quote(&deck.bodies[*body].name)),
+                    ("nearest", array(nearest.iter().map(|x| vector(x)))),
+                    ("force", vector(force)),
+                ]);
+                w.line("load", "point", point);
+            }
+            Load::Gravity(gravity) => w.line("load", "gravity", vector(gravity)),
+            Load::BodyForce(force) => w.line("load", "body_force", expressions(force)),
+            Load::Manufactured(field) => w.line("load", "manufactured", expressions(field)),
+        }
+    }
+}
+
+fn results(w: &mut Writer, deck: &Deck) {
+    for verify in &deck.verify {
+        w.table("[[verify]]");
+        w.line("verify", "name", quote(&verify.name));
+        w.line("verify", "field", quote(&verify.field));
+        let exact = match verify.exact.as_slice() {
+            [one] => expression(one),
+            all => expressions(all),
+        };
+        w.line("verify", "exact", exact);
+        w.line("verify", "norm", quote(verify.norm.name()));
+        w.line("verify", "scale", number(verify.scale));
+    }
+    w.table("[output]");
+    let every = match deck.output.every {
+        Every::Steps(steps) => steps.to_string(),
+        Every::Seconds(seconds) => inline(&[("seconds", number(seconds))]),
+    };
+    w.line("output", "every", every);
+    w.line("output", "fields", array(deck.output.fields.iter().map(|field| quote(field))));
+    if let Some(checkpoint) = &deck.output.checkpoint {
+        let mut pairs = Vec::new();
+        pairs.extend(checkpoint.every.map(|steps| ("every", steps.to_string())));
+        pairs.extend(checkpoint.minutes.map(|minutes| ("minutes", number(minutes))));
+        pairs.push(("keep", checkpoint.keep.to_string()));
+        w.line("output", "checkpoint", inline(&pairs));
+    }
+    w.table("[parallel]");
+    w.optional("parallel", "brick", deck.parallel.brick.map(|cells| cells.to_string()));
+    w.line("parallel", "rebalance_above", number(deck.parallel.rebalance_above));
+    if !deck.petsc.is_empty() {
+        w.table("[petsc]");
+        for (name, value) in &deck.petsc {
+            let value = if value.is_empty() { "true".to_string() } else { quote(value) };
+            w.text.push_str(&format!("{} = {value}\n", quote(name)));
+        }
+    }
 }

@@ -132,10 +132,8 @@ impl Shape {
                 .map(|a| if corner >> a & 1 == 0 { low[a] } else { high[a] })
                 .collect();
             let global = self.placement.globalise(padded(&local));
-            for a in 0..dimension {
-                bounds.0[a] = bounds.0[a].min(global[a]);
-                bounds.1[a] = bounds.1[a].max(global[a]);
-            }
+            let corner = global[..dimension].to_vec();
+            bounds = joined(bounds, &(corner.clone(), corner));
         }
         Some(bounds)
     }

@@ -73,15 +73,21 @@ impl Element {
         [if self.is_simplex() { 1.0 / (D as f64 + 1.0) } else { 0.0 }; D]
     }
 
-    /// How far `xi` is outside the reference cell, as a fraction of the cell's extent; negative
-    /// inside, zero on a face.
+    /// How far `xi` is outside the reference cell, as a fraction of the cell's extent: the
+    /// length of the excess over all faces. Zero on a face; inside, minus the distance to the
+    /// nearest one.
     pub fn outside<const D: usize>(self, xi: &[f64; D]) -> f64 {
-        if self.is_simplex() {
-            let rest = 1.0 - xi.iter().sum::<f64>();
-            xi.iter().fold(-rest, |worst, &x| worst.max(-x))
-        } else {
-            0.5 * (xi.iter().fold(0.0, |worst: f64, x| worst.max(x.abs())) - 1.0)
+        let excess = |axis: usize| {
+            if self.is_simplex() { -xi[axis] } else { 0.5 * (xi[axis].abs() - 1.0) }
+        };
+        let oblique =
+            if self.is_simplex() { xi.iter().sum::<f64>() - 1.0 } else { f64::NEG_INFINITY };
+        let (mut worst, mut squares) = (oblique, oblique.max(0.0).powi(2));
+        for axis in 0..D {
+            worst = worst.max(excess(axis));
+            squares += excess(axis).max(0.0).powi(2);
         }
+        if worst > 0.0 { squares.sqrt() } else { worst }
     }
 
     /// N_a(xi).
@@ -329,5 +335,6 @@ mod tests {
         assert_eq!(Element::Tri3.outside(&[0.25, -0.125]), 0.125);
         assert_eq!(Element::Tet4.outside(&[0.25, 0.25, 0.25]), -0.25);
         assert_eq!(Element::Tri3.outside(&[1.0, 0.25]), 0.25);
+        assert_eq!(Element::Quad4.outside(&[1.6, -1.8]), 0.5);
     }
 }

@@ -6,8 +6,9 @@
 
 use crate::error::{Error, Result};
 
+use super::element::{self, Element};
 use super::lattice::CELL_CORNERS;
-use super::{FacePair, Grid, Lattice};
+use super::{FacePair, Grid, Lattice, Mesh};
 
 /// What the face matrix needs of one interior face.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +25,7 @@ pub struct FaceJump {
 }
 
 /// Abscissae of the two-point Gauss rule on [0, 1]; both weights are 1/2.
-pub(super) const GAUSS_UNIT: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+const GAUSS_UNIT: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 impl<const D: usize> Grid<D> {
     /// Geometry of an interior face. Quadrature with two points per axis of the face, which is
@@ -34,11 +35,12 @@ impl<const D: usize> Grid<D> {
     pub fn face_jump(&self, pair: FacePair) -> Result<FaceJump> {
         match self {
             Grid::Lattice(lattice) => lattice_jump(lattice, pair),
+            Grid::Mesh(mesh) => mesh_jump(mesh, pair),
         }
     }
 }
 
-pub(super) fn no_common_face(pair: FacePair) -> Error {
+fn no_common_face(pair: FacePair) -> Error {
     Error::Run(format!("cells {} and {} share no face of the grid", pair.lower, pair.upper))
 }
 
@@ -88,6 +90,129 @@ fn lattice_jump<const D: usize>(lattice: &Lattice<D>, pair: FacePair) -> Result<
         size: if D == 3 { area.sqrt() } else { area },
         cell_size: lattice.spacing[axis],
     })
+}
+
+/// On a mesh both cells' gradients are taken at the same places of the face; a face point has
+/// its reference coordinates in either cell by interpolation between the face's nodes.
+fn mesh_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump> {
+    let inside = pair.lower < mesh.cell_count() && pair.upper < mesh.cell_count();
+    let face = inside
+        .then(|| mesh.across(pair.lower).position(|other| other == Some(pair.upper)))
+        .flatten()
+        .ok_or_else(|| no_common_face(pair))?;
+    let element = mesh.element;
+    let face = element.faces()[face];
+    let cells = [pair.lower, pair.upper];
+    let nodes = cells.map(|cell| mesh.nodes_of(cell));
+    let positions = cells.map(|cell| mesh.cell_positions(cell));
+    let x: Vec<[f64; D]> = face.iter().map(|&a| positions[0][a]).collect();
+    // Where the lower cell's face nodes are among the upper cell's.
+    let mut local = [face.to_vec(), Vec::with_capacity(face.len())];
+    for &a in face {
+        let found = nodes[1].iter().position(|&n| n == nodes[0][a]);
+        local[1].push(found.ok_or_else(|| no_common_face(pair))?);
+    }
+    let mut union: Vec<u32> = nodes.concat();
+    union.sort_unstable();
+    union.dedup();
+
+    let rule = face_rule(element);
+    let mut points = Vec::with_capacity(rule.len());
+    let mut area = 0.0;
+    let mut mean_normal = [0.0; D];
+    for (shape, slopes, weight) in &rule {
+        let area_vector = area_vector(&x, slopes);
+        let measure = area_vector.iter().map(|n| n * n).sum::<f64>().sqrt();
+        let normal = area_vector.map(|n| n / measure);
+        area += weight * measure;
+        for (mean, n) in mean_normal.iter_mut().zip(&area_vector) {
+            *mean += weight * n;
+        }
+        let mut jump = vec![0.0; union.len()];
+        for (side, sign) in [(0, -1.0), (1, 1.0)] {
+            let mut xi = [0.0; D];
+            for (n, &a) in shape.iter().zip(&local[side]) {
+                let node: [f64; D] = element.reference_node(a);
+                for (xi, node) in xi.iter_mut().zip(&node) {
+                    *xi += n * node;
+                }
+            }
+            let own = &positions[side][..element.node_count()];
+            let (gradients, _) = element::gradients(element, own, &xi).ok_or_else(|| {
+                Error::Run(format!("cell {} of the mesh is flat at a face", cells[side]))
+            })?;
+            for (&node, g) in nodes[side].iter().zip(&gradients) {
+                let slot = union.partition_point(|&n| n < node);
+                jump[slot] += sign * g.iter().zip(&normal).map(|(g, n)| g * n).sum::<f64>();
+            }
+        }
+        points.push((weight * measure, jump));
+    }
+    let length = mean_normal.iter().map(|n| n * n).sum::<f64>().sqrt();
+    let normal = mean_normal.map(|n| n / length);
+    let extent = positions.map(|x| {
+        let along = x[..element.node_count()]
+            .iter()
+            .map(|x| x.iter().zip(&normal).map(|(x, n)| x * n).sum::<f64>());
+        let (low, high) =
+            along.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), t| (l.min(t), h.max(t)));
+        high - low
+    });
+    Ok(FaceJump {
+        nodes: union.iter().map(|&n| n as usize).collect(),
+        points,
+        size: if D == 3 { area.sqrt() } else { area },
+        cell_size: 0.5 * (extent[0] + extent[1]),
+    })
+}
+
+/// Per quadrature point of a face: basis of its nodes, derivatives along its one or two
+/// parameters, and weight. Edges: two Gauss points on [0, 1]. Triangles: three points.
+/// Quadrilaterals: 2 x 2 on the unit square.
+fn face_rule(element: Element) -> Vec<(Vec<f64>, Vec<[f64; 2]>, f64)> {
+    match element {
+        Element::Tri3 | Element::Quad4 => GAUSS_UNIT
+            .iter()
+            .map(|&t| (vec![1.0 - t, t], vec![[-1.0, 0.0], [1.0, 0.0]], 0.5))
+            .collect(),
+        Element::Tet4 => (0..3)
+            .map(|corner| {
+                let shape = (0..3).map(|a| if a == corner { 2.0 / 3.0 } else { 1.0 / 6.0 });
+                (shape.collect(), vec![[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]], 1.0 / 6.0)
+            })
+            .collect(),
+        Element::Hex8 => (0..4)
+            .map(|g| {
+                let (s, t) = (GAUSS_UNIT[g % 2], GAUSS_UNIT[g / 2]);
+                (
+                    vec![(1.0 - s) * (1.0 - t), s * (1.0 - t), s * t, (1.0 - s) * t],
+                    vec![[t - 1.0, s - 1.0], [1.0 - t, -s], [t, s], [-t, 1.0 - s]],
+                    0.25,
+                )
+            })
+            .collect(),
+    }
+}
+
+/// Outward normal of the cell that owns the face, times the face's measure per parameter area.
+fn area_vector<const D: usize>(x: &[[f64; D]], slopes: &[[f64; 2]]) -> [f64; D] {
+    let mut tangents = [[0.0; D]; 2];
+    for (x, slope) in x.iter().zip(slopes) {
+        for (tangent, s) in tangents.iter_mut().zip(slope) {
+            for (t, x) in tangent.iter_mut().zip(x) {
+                *t += s * x;
+            }
+        }
+    }
+    let [u, v] = tangents;
+    if D == 2 {
+        std::array::from_fn(|a| if a == 0 { u[1] } else { -u[0] })
+    } else {
+        std::array::from_fn(|a| {
+            let (b, c) = ((a + 1) % 3, (a + 2) % 3);
+            u[b] * v[c] - u[c] * v[b]
+        })
+    }
 }
 
 #[cfg(test)]

@@ -69,9 +69,15 @@ impl<const D: usize> Lattice<D> {
             if !(t >= -LINE_TOLERANCE && t <= n as f64 + LINE_TOLERANCE) {
                 return None;
             }
-            index[axis] = (t as usize).min(n - 1);
+            // Round-off must not split a row of points that lie on one grid line.
+            index[axis] = ((t + LINE_TOLERANCE).max(0.0) as usize).min(n - 1);
         }
         Some(self.cell_at(index))
+    }
+
+    /// Lowest-numbered cell at a node.
+    pub fn lowest_cell(&self, node: usize) -> usize {
+        self.cell_at(self.node_index(node).map(|i| i.saturating_sub(1)))
     }
 
     /// Appends the cell's nodes in hex8 order.
@@ -86,14 +92,14 @@ impl<const D: usize> Lattice<D> {
     pub fn face_neighbours(&self, cell: usize, out: &mut Vec<usize>) {
         let index = self.cell_index(cell);
         let mut stride = 1;
-        for axis in 0..D {
-            if index[axis] > 0 {
+        for (&i, &count) in index.iter().zip(&self.cells) {
+            if i > 0 {
                 out.push(cell - stride);
             }
-            if index[axis] + 1 < self.cells[axis] {
+            if i + 1 < count {
                 out.push(cell + stride);
             }
-            stride *= self.cells[axis];
+            stride *= count;
         }
     }
 }

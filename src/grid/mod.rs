@@ -4,24 +4,46 @@
 //! |---|---|---|
 //! | `type = "lattice"` | [`Lattice`]: equal boxes, topology by arithmetic | `lattice.rs` |
 //! | `type = "mesh"` | [`Mesh`]: tri3, quad4, tet4, hex8 with faces and tags | `mesh.rs` |
-//! | interior faces for Ghost | [`FaceJump`] | `face.rs` |
+//! | `file` | Gmsh 4.1 reader | `gmsh.rs` |
+//! | `generate` | boxes and rings | `generate.rs` |
+//! | `motion` | rotation and following the material (Rotation §2 (viii)) | `motion.rs` |
+//! | `element` | shape functions, inverse maps | `element.rs` |
+//! | `points_per_cell`, `gauss` on a mesh | sub-cells and Gauss points | `quadrature.rs` |
 //!
+//! Behind them: `topology.rs` (neighbours), `check.rs` (what a mesh must satisfy), `locate.rs`
+//! (bins), `interpolate.rs` (the basis at a place), `face.rs` ([`FaceJump`] for Ghost).
 //! Node and cell numbers are global `usize` values, the same on every rank.
 
+pub mod check;
 pub mod element;
 pub mod face;
+pub mod generate;
+pub mod gmsh;
+pub mod interpolate;
 pub mod lattice;
+pub mod locate;
+pub mod mesh;
+pub mod motion;
 pub mod quadrature;
+mod topology;
+
+#[cfg(test)]
+mod tests;
 
 pub use face::FaceJump;
+pub use interpolate::Interpolation;
 pub use lattice::Lattice;
+pub use mesh::Mesh;
 
 use crate::error::{Error, Result};
 
 /// Either grid, dispatched per call; both answer the same questions.
+// One grid per run: its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone)]
 pub enum Grid<const D: usize> {
     Lattice(Lattice<D>),
+    Mesh(Mesh<D>),
 }
 
 /// An interior face: the two cells that share it, in ascending order.
@@ -35,26 +57,30 @@ impl<const D: usize> Grid<D> {
     pub fn node_count(&self) -> usize {
         match self {
             Grid::Lattice(lattice) => lattice.node_count(),
+            Grid::Mesh(mesh) => mesh.node_count(),
         }
     }
 
     pub fn cell_count(&self) -> usize {
         match self {
             Grid::Lattice(lattice) => lattice.cell_count(),
+            Grid::Mesh(mesh) => mesh.cell_count(),
         }
     }
 
-    /// Coordinates of a node, m.
+    /// Present coordinates of a node, m.
     pub fn node_position(&self, node: usize) -> [f64; D] {
         match self {
             Grid::Lattice(lattice) => lattice.node_position(node),
+            Grid::Mesh(mesh) => mesh.node_position(node),
         }
     }
 
-    /// Coordinates of a node at the start of the run, m.
-    pub fn node_start(&self, node: usize) -> [f64; D] {
+    /// Coordinates of a node before the mesh ever moved, m.
+    pub fn node_position_initial(&self, node: usize) -> [f64; D] {
         match self {
             Grid::Lattice(lattice) => lattice.node_position(node),
+            Grid::Mesh(mesh) => mesh.node_position_initial(node),
         }
     }
 
@@ -65,6 +91,7 @@ impl<const D: usize> Grid<D> {
                 let index = lattice.node_index(node)[axis];
                 index == if upper { lattice.cells[axis] } else { 0 }
             }
+            Grid::Mesh(_) => false,
         }
     }
 
@@ -74,15 +101,18 @@ impl<const D: usize> Grid<D> {
             Grid::Lattice(_) => Err(Error::Input(format!(
                 "boundary tag \"{tag}\": a lattice has no tags; use side or box"
             ))),
+            Grid::Mesh(mesh) => mesh.tagged_nodes(tag),
         }
     }
 
     /// The cell that holds `x`, or `None` outside the grid. A point on a shared face belongs to
     /// the upper cell on a lattice (half-open cells; the grid's own upper edge is closed) and
-    /// to the lowest-numbered cell on a mesh.
+    /// to the lowest-numbered cell on a mesh. A mesh holds points up to [`locate::REACH`] of a
+    /// cell outside it: a polygon that turns inside a round outline cuts other chords.
     pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
         match self {
             Grid::Lattice(lattice) => lattice.locate(x),
+            Grid::Mesh(mesh) => mesh.locate_near(x, locate::REACH, None).map(|found| found.0),
         }
     }
 
@@ -90,6 +120,7 @@ impl<const D: usize> Grid<D> {
     pub fn cell_nodes(&self, cell: usize, out: &mut Vec<usize>) {
         match self {
             Grid::Lattice(lattice) => lattice.cell_nodes(cell, out),
+            Grid::Mesh(mesh) => mesh.cell_nodes(cell, out),
         }
     }
 
@@ -97,13 +128,43 @@ impl<const D: usize> Grid<D> {
     pub fn face_neighbours(&self, cell: usize, out: &mut Vec<usize>) {
         match self {
             Grid::Lattice(lattice) => lattice.face_neighbours(cell, out),
+            Grid::Mesh(mesh) => mesh.face_neighbours(cell, out),
         }
     }
 
-    /// A length typical of a cell, m: the smallest spacing on a lattice.
+    /// Lowest-numbered cell at a node.
+    pub fn lowest_cell(&self, node: usize) -> usize {
+        match self {
+            Grid::Lattice(lattice) => lattice.lowest_cell(node),
+            Grid::Mesh(mesh) => mesh.lowest_cell(node),
+        }
+    }
+
+    /// Kind of the cells.
+    pub fn element(&self) -> element::Element {
+        match self {
+            Grid::Lattice(_) if D == 2 => element::Element::Quad4,
+            Grid::Lattice(_) => element::Element::Hex8,
+            Grid::Mesh(mesh) => mesh.element,
+        }
+    }
+
+    /// Lowest and highest coordinates of the grid, m.
+    pub fn bounds(&self) -> ([f64; D], [f64; D]) {
+        match self {
+            Grid::Lattice(lattice) => {
+                (lattice.origin, lattice.node_position(lattice.node_count() - 1))
+            }
+            Grid::Mesh(mesh) => mesh.bounds(),
+        }
+    }
+
+    /// A length typical of a cell, m: the smallest spacing on a lattice, the smallest edge on a
+    /// mesh.
     pub fn cell_size(&self) -> f64 {
         match self {
             Grid::Lattice(lattice) => lattice.spacing.iter().copied().fold(f64::INFINITY, f64::min),
+            Grid::Mesh(mesh) => mesh.cell_size(),
         }
     }
 }

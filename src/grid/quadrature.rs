@@ -11,6 +11,8 @@ use super::element::{self, Element};
 pub struct SubCell<const D: usize> {
     /// Image of the centre of the reference sub-cell, m.
     pub position: [f64; D],
+    /// Centroid, m: the centre that CPDI2's functions reproduce.
+    pub centroid: [f64; D],
     /// m^D
     pub volume: f64,
     /// Domain for CPDI, m: counter-clockwise in 2D, hex8 order in 3D. A simplex repeats
@@ -53,10 +55,16 @@ fn boxes<const D: usize>(
             std::array::from_fn(|a| half[a] * ((2 * index[a] + 1) as f64 + local[a]) - 1.0)
         };
         let mut volume = 0.0;
+        let mut moment = [0.0; D];
         for (local, weight) in &rule {
-            // det J has degree two per axis, so two points are exact.
-            let dn = element.shape_gradients(&place(*local));
-            volume += weight * element::determinant(&element::jacobian(nodes, &dn));
+            // x det J has degree three per axis at most, so two points are exact.
+            let xi = place(*local);
+            let dn = element.shape_gradients(&xi);
+            let part = weight * element::determinant(&element::jacobian(nodes, &dn));
+            volume += part;
+            for (m, x) in moment.iter_mut().zip(element::position(element, nodes, &xi)) {
+                *m += part * x;
+            }
         }
         let mut corners = [[0.0; D]; 8];
         for (a, corner) in corners.iter_mut().enumerate().take(1 << D) {
@@ -64,6 +72,7 @@ fn boxes<const D: usize>(
         }
         out.push(SubCell {
             position: element::position(element, nodes, &place([0.0; D])),
+            centroid: moment.map(|m| m / volume),
             volume: volume * half.iter().product::<f64>(),
             corners,
         });
@@ -131,7 +140,7 @@ fn simplices<const D: usize>(
             }
             let position =
                 std::array::from_fn(|a| x.iter().map(|x| x[a]).sum::<f64>() / (D as f64 + 1.0));
-            out.push(SubCell { position, volume, corners });
+            out.push(SubCell { position, centroid: position, volume, corners });
         }
     }
 }

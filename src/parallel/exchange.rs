@@ -10,71 +10,99 @@ use crate::error::{Error, Result};
 
 use super::World;
 
+/// Longer lists travel in several messages: MPI counts bytes in 32 bits.
+const LARGEST_MESSAGE: usize = 1 << 30;
+
 /// Sends each list to its rank and returns what arrived, in ascending order of the source.
-/// Empty lists are not sent; a list for oneself passes by. Collective.
+/// Empty lists are not sent; a list for oneself passes by; of several lists for one rank the
+/// receiver sees one, joined in order. Collective. Error, on all ranks: a rank that does not
+/// exist.
 pub fn exchange<T: Pod>(
     world: &World,
     outgoing: Vec<(usize, Vec<T>)>,
 ) -> Result<Vec<(usize, Vec<T>)>> {
+    exchange_in_messages(world, outgoing, LARGEST_MESSAGE)
+}
+
+/// [`exchange`] with messages of at most `largest` bytes (at least one value each).
+pub fn exchange_in_messages<T: Pod>(
+    world: &World,
+    outgoing: Vec<(usize, Vec<T>)>,
+    largest: usize,
+) -> Result<Vec<(usize, Vec<T>)>> {
+    let mut incoming: Vec<(usize, Vec<T>)> = Vec::new();
+    let mut remote: Vec<(usize, Vec<T>)> = Vec::new();
+    let mut wrong = Ok(());
+    for (rank, list) in outgoing {
+        if rank >= world.size() {
+            let size = world.size();
+            wrong = Err(Error::Environment(format!("a message to rank {rank} of {size}")));
+        } else if rank == world.rank() {
+            append(&mut incoming, rank, &list);
+        } else if !list.is_empty() {
+            remote.push((rank, list));
+        }
+    }
+    world.fail_together(wrong)?;
+    if world.size() > 1 {
+        let per_message = (largest / size_of::<T>()).max(1);
+        swap(world, &remote, per_message, &mut incoming);
+    }
+    incoming.retain(|(_, list)| !list.is_empty());
+    incoming.sort_by_key(|(source, _)| *source);
+    Ok(incoming)
+}
+
+/// Adds to the list of `source`. Messages of one source arrive in the order they were sent.
+fn append<T: Pod>(incoming: &mut Vec<(usize, Vec<T>)>, source: usize, values: &[T]) {
+    match incoming.iter_mut().find(|(rank, _)| *rank == source) {
+        Some((_, list)) => list.extend_from_slice(values),
+        None => incoming.push((source, values.to_vec())),
+    }
+}
+
+fn swap<T: Pod>(
+    world: &World,
+    remote: &[(usize, Vec<T>)],
+    per_message: usize,
+    incoming: &mut Vec<(usize, Vec<T>)>,
+) {
     // Two consecutive exchanges must not mix: ranks may leave the first at different times, and
     // a message of the second can overtake the barrier of the first on a slow rank.
     let tag = world.next_tag();
     let comm = world.comm();
-    let mut incoming: Vec<(usize, Vec<T>)> = Vec::new();
-    let mut remote: Vec<(usize, Vec<T>)> = Vec::new();
-    for (rank, list) in outgoing {
-        if list.is_empty() {
-            continue;
-        }
-        if std::mem::size_of_val(&list[..]) > i32::MAX as usize {
-            return Err(Error::Environment(format!(
-                "one message of {} bytes is more than MPI can count; use more ranks",
-                std::mem::size_of_val(&list[..])
-            )));
-        }
-        if rank == world.rank() {
-            incoming.push((rank, list));
-        } else {
-            remote.push((rank, list));
-        }
-    }
-    if world.size() > 1 {
-        mpi::request::scope(|scope| {
-            let mut sends: Vec<_> = remote
-                .iter()
-                .map(|(rank, list)| {
-                    let bytes: &[u8] = bytemuck::cast_slice(list);
-                    comm.process_at_rank(*rank as i32)
-                        .immediate_synchronous_send_with_tag(scope, bytes, tag)
-                })
-                .collect();
-            let mut barrier: Option<Request<'static, (), StaticScope>> = None;
-            loop {
-                while let Some((message, status)) =
-                    comm.any_process().immediate_matched_probe_with_tag(tag)
-                {
-                    let (bytes, _): (Vec<u8>, _) = (message, status).matched_receive_vec();
-                    let source = status.source_rank() as usize;
-                    let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
-                    bytemuck::cast_slice_mut(&mut list).copy_from_slice(&bytes);
-                    incoming.push((source, list));
-                }
-                match barrier.take() {
-                    Some(request) => match request.test() {
-                        Ok(_) => break,
-                        Err(request) => barrier = Some(request),
-                    },
-                    None => {
-                        sends =
-                            sends.into_iter().filter_map(|request| request.test().err()).collect();
-                        if sends.is_empty() {
-                            barrier = Some(comm.immediate_barrier());
-                        }
+    mpi::request::scope(|scope| {
+        let mut sends: Vec<_> = remote
+            .iter()
+            .flat_map(|(rank, list)| list.chunks(per_message).map(|piece| (*rank, piece)))
+            .map(|(rank, piece)| {
+                let bytes: &[u8] = bytemuck::cast_slice(piece);
+                comm.process_at_rank(rank as i32)
+                    .immediate_synchronous_send_with_tag(scope, bytes, tag)
+            })
+            .collect();
+        let mut barrier: Option<Request<'static, (), StaticScope>> = None;
+        loop {
+            while let Some((message, status)) =
+                comm.any_process().immediate_matched_probe_with_tag(tag)
+            {
+                let (bytes, _): (Vec<u8>, _) = (message, status).matched_receive_vec();
+                let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
+                bytemuck::cast_slice_mut(&mut list).copy_from_slice(&bytes);
+                append(incoming, status.source_rank() as usize, &list);
+            }
+            match barrier.take() {
+                Some(request) => match request.test() {
+                    Ok(_) => break,
+                    Err(request) => barrier = Some(request),
+                },
+                None => {
+                    sends = sends.into_iter().filter_map(|request| request.test().err()).collect();
+                    if sends.is_empty() {
+                        barrier = Some(comm.immediate_barrier());
                     }
                 }
             }
-        });
-    }
-    incoming.sort_by_key(|(source, _)| *source);
-    Ok(incoming)
+        }
+    });
 }

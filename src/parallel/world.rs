@@ -6,7 +6,7 @@ use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::*;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 /// All ranks of a run.
 pub struct World {
@@ -131,21 +131,6 @@ impl World {
     /// Fails on all ranks, with the error of the lowest failing rank, if it failed on any: call
     /// it before the next collective operation so that nobody waits for a rank that is gone.
     pub fn fail_together<T>(&self, outcome: Result<T>) -> Result<T> {
-        let code = outcome.as_ref().err().map_or(0, Error::exit_code);
-        let text = outcome.as_ref().err().map(|error| format!("{code}{error}"));
-        match (outcome, self.first_message(text)) {
-            (Ok(value), None) => Ok(value),
-            (_, message) => {
-                let message = message.unwrap_or_default();
-                let (code, text) = message.split_at(message.len().min(1));
-                let text = text.to_string();
-                Err(match code {
-                    "2" => Error::Input(text),
-                    "3" => Error::File(text),
-                    "4" => Error::Environment(text),
-                    _ => Error::Run(text),
-                })
-            }
-        }
+        crate::petsc::agree(&self.comm, outcome)
     }
 }

@@ -52,6 +52,13 @@ pub fn get(name: &str) -> Result<Option<String>> {
     Ok((found != sys::PETSC_FALSE).then(|| text_of(value)))
 }
 
+/// Removes an option, whoever set it.
+pub fn clear(name: &str) -> Result<()> {
+    require_running()?;
+    let key = c_text(&dashed(name))?;
+    petsc!(PetscOptionsClearValue(null_mut(), key.as_ptr()))
+}
+
 /// Options set by the user and read by no object so far, as `-name value`.
 pub fn unused() -> Result<Vec<String>> {
     require_running()?;

@@ -64,6 +64,11 @@ impl<'u> Session<'u> {
         petsc!(PetscPushErrorHandler(Some(remember), std::ptr::null_mut()))?;
         // Signals stay the program's own: PETSc would turn each into an abort.
         petsc!(PetscPopSignalHandler())?;
+        // Multigrid's coarse operators: the default algorithm adds in the order of arrival, this
+        // one gives the same bits on every repeat. Sequential matrices do not know the word.
+        if universe.world().size() > 1 {
+            options::set_default("matptap_via", "allatonce")?;
+        }
         Ok(Session { universe: PhantomData })
     }
 

@@ -115,9 +115,9 @@ impl Snes {
 
     /// Built-in options under the prefix: pairs such as `("pc_type", "lu")`. The user's win.
     /// Call before [`Self::set_from_options`].
-    pub fn set_defaults(&self, options: &[(&str, &str)]) -> Result<()> {
+    pub fn set_defaults<V: AsRef<str>>(&self, options: &[(&str, V)]) -> Result<()> {
         for (name, value) in options {
-            super::options::set_default(&format!("{}{name}", self.prefix), value)?;
+            super::options::set_default(&format!("{}{name}", self.prefix), value.as_ref())?;
         }
         Ok(())
     }

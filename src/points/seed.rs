@@ -4,12 +4,13 @@
 
 use std::ops::Range;
 
-use crate::deck::model::{Body, BodySource, Deck, Seeding};
+use crate::deck::model::{Basis, Body, BodySource, Deck, Seeding};
 use crate::deck::{Scope, Shape};
 use crate::error::{Error, Result};
-use crate::grid::{Grid, Lattice};
+use crate::grid::quadrature::SubCell;
+use crate::grid::{Grid, Lattice, Mesh};
 
-use super::Points;
+use super::{Points, rectangle_corners};
 
 /// Which share of the candidates to make.
 #[derive(Debug, Clone, Copy)]
@@ -29,25 +30,42 @@ impl Share {
 pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result<Points<D>> {
     let mut points = Points::default();
     let mut first_id = 0u64;
+    // The position of a CPDI2 point is the centroid of its domain; others sit where their
+    // sub-cell's centre maps to.
+    let at_centroid = deck.method.basis == Basis::Cpdi2;
     for (index, body) in deck.bodies.iter().enumerate() {
         let made = points.len();
-        let candidates = match &body.source {
-            BodySource::Shape { shape, seeding } => match (seeding, grid) {
-                (Seeding::PerCell(counts), Grid::Lattice(lattice)) => {
-                    per_cell(&mut points, index, body, shape, counts, lattice, share, first_id)
-                }
-                (Seeding::Lattice { spacing, offset }, _) => {
-                    on_lattice(&mut points, index, body, shape, *spacing, offset, share, first_id)?
-                }
-                (Seeding::Gauss(order), Grid::Lattice(lattice)) => {
-                    let counts = vec![*order; D];
-                    per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
-                }
-            },
-            BodySource::File(path) => {
+        let candidates = match (&body.source, grid) {
+            (BodySource::File(path), _) => {
                 super::file::read_points(&mut points, index, body, path, share, first_id)?
             }
-            BodySource::MeshCells { .. } => {
+            (BodySource::Shape { shape, seeding: Seeding::Lattice { spacing, offset } }, _) => {
+                on_lattice(&mut points, index, body, shape, *spacing, offset, share, first_id)?
+            }
+            (BodySource::Shape { shape, seeding }, Grid::Lattice(lattice)) => {
+                let counts = match seeding {
+                    Seeding::PerCell(counts) => counts.clone(),
+                    Seeding::Gauss(order) => vec![*order; D],
+                    Seeding::Lattice { .. } => unreachable!("matched above"),
+                };
+                per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
+            }
+            (BodySource::Shape { shape, seeding }, Grid::Mesh(mesh)) => {
+                let cells: Vec<usize> = (0..mesh.cell_count()).collect();
+                let inside = |x: &[f64; D]| shape.contains(x);
+                let seeding = CellSeeding { mesh, cells: &cells, seeding, at_centroid };
+                seeding.run(&mut points, index, body, inside, share, first_id)
+            }
+            (BodySource::MeshCells { tag, seeding }, Grid::Mesh(mesh)) => {
+                let cells = match tag {
+                    Some(tag) => mesh.tagged_cells(tag)?,
+                    None => (0..mesh.cell_count()).collect(),
+                };
+                let all = |_: &[f64; D]| true;
+                let seeding = CellSeeding { mesh, cells: &cells, seeding, at_centroid };
+                seeding.run(&mut points, index, body, all, share, first_id)
+            }
+            (BodySource::MeshCells { .. }, Grid::Lattice(_)) => {
                 return Err(Error::Input(format!(
                     "body \"{}\" takes the cells of a mesh, but the grid is a lattice; give it \
                      a shape with points_per_cell",
@@ -91,14 +109,78 @@ fn per_cell<const D: usize>(
             if shape.contains(&x) {
                 let id = first_id + (candidate * per_cell + sub) as u64;
                 points.push_unstrained(id, index as u32, x, volume, body.density, half);
-                mark_outermost(points, shape, &x, &half);
+                mark_outermost(points, |neighbour| shape.contains(neighbour), &x, &half);
             }
         }
     }
     (cells * per_cell) as u64
 }
 
-/// Points at offset + (i, j, k) spacing, kept where they are inside.
+/// Sub-cells or Gauss points of mesh cells. A mesh body has no outermost layer: its boundary is
+/// the mesh's own.
+struct CellSeeding<'a, const D: usize> {
+    mesh: &'a Mesh<D>,
+    cells: &'a [usize],
+    seeding: &'a Seeding,
+    at_centroid: bool,
+}
+
+impl<const D: usize> CellSeeding<'_, D> {
+    /// Makes the points that are inside; returns the number of candidates.
+    fn run(
+        &self,
+        points: &mut Points<D>,
+        index: usize,
+        body: &Body,
+        inside: impl Fn(&[f64; D]) -> bool,
+        share: Share,
+        first_id: u64,
+    ) -> u64 {
+        // No element makes more than six times n^D sub-cells of one cell.
+        let n = match self.seeding {
+            Seeding::PerCell(counts) => counts.iter().copied().max().unwrap_or(1),
+            Seeding::Gauss(order) => *order,
+            Seeding::Lattice { .. } => unreachable!("a lattice of points is seeded by its shape"),
+        };
+        let per_cell = 6 * n.pow(D as u32);
+        let mut made = Vec::new();
+        for candidate in share.of(self.cells.len()) {
+            made.clear();
+            self.split(self.cells[candidate], &mut made);
+            for (sub, part) in made.iter().enumerate() {
+                let x = if self.at_centroid { part.centroid } else { part.position };
+                if !inside(&x) {
+                    continue;
+                }
+                let half = [0.5 * part.volume.powf(1.0 / D as f64); D];
+                let id = first_id + (candidate * per_cell + sub) as u64;
+                points.push_unstrained(id, index as u32, x, part.volume, body.density, half);
+                *points.corners.last_mut().expect("a point was just pushed") = part.corners;
+            }
+        }
+        (self.cells.len() * per_cell) as u64
+    }
+
+    fn split(&self, cell: usize, out: &mut Vec<SubCell<D>>) {
+        match self.seeding {
+            Seeding::PerCell(counts) => {
+                self.mesh.sub_cells(cell, std::array::from_fn(|a| counts[a]), out);
+            }
+            Seeding::Gauss(order) => {
+                let mut gauss = Vec::new();
+                self.mesh.gauss_points(cell, *order, &mut gauss);
+                out.extend(gauss.into_iter().map(|(position, volume)| {
+                    let half = [0.5 * volume.powf(1.0 / D as f64); D];
+                    let corners = rectangle_corners(position, half);
+                    SubCell { position, centroid: position, volume, corners }
+                }));
+            }
+            Seeding::Lattice { .. } => {}
+        }
+    }
+}
+
+/// Points at offset + (i, j, k) spacing in the shape's frame, kept where they are inside.
 #[allow(clippy::too_many_arguments)]
 fn on_lattice<const D: usize>(
     points: &mut Points<D>,
@@ -110,7 +192,7 @@ fn on_lattice<const D: usize>(
     share: Share,
     first_id: u64,
 ) -> Result<u64> {
-    let Some((min, max)) = shape.bounds() else {
+    let Some((min, max)) = shape.local_bounds() else {
         return Err(Error::Input(format!(
             "body \"{}\" is unbounded and seeded by a lattice of spacing {spacing}; intersect it \
              with a box, or use points_per_cell",
@@ -124,13 +206,17 @@ fn on_lattice<const D: usize>(
         .collect();
     let candidates = size.iter().product();
     let half = [0.5 * spacing; D];
+    let volume = spacing.powi(D as i32);
     for candidate in share.of(candidates) {
         let at: [usize; D] = split(candidate, &size);
-        let x = std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
-        if shape.contains(&x) {
+        let local: [f64; D] =
+            std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
+        if shape.contains_local(&local) {
+            let placed = shape.to_global(&local);
+            let x = std::array::from_fn(|a| placed[a]);
             let id = first_id + candidate as u64;
-            points.push_unstrained(id, index as u32, x, spacing.powi(D as i32), body.density, half);
-            mark_outermost(points, shape, &x, &half);
+            points.push_unstrained(id, index as u32, x, volume, body.density, half);
+            mark_outermost(points, |neighbour| shape.contains_local(neighbour), &local, &half);
         }
     }
     Ok(candidates as u64)
@@ -139,7 +225,7 @@ fn on_lattice<const D: usize>(
 /// A point is outermost if a neighbour of its seeding would lie outside the shape.
 fn mark_outermost<const D: usize>(
     points: &mut Points<D>,
-    shape: &Shape,
+    contains: impl Fn(&[f64]) -> bool,
     x: &[f64; D],
     half: &[f64; D],
 ) {
@@ -147,7 +233,7 @@ fn mark_outermost<const D: usize>(
         [-2.0, 2.0].iter().any(|step| {
             let mut neighbour = *x;
             neighbour[axis] += step * half[axis];
-            !shape.contains(&neighbour)
+            !contains(&neighbour)
         })
     });
     *points.outermost.last_mut().expect("a point was just pushed") = f64::from(u8::from(outermost));

@@ -59,6 +59,7 @@ pub fn on_ranks_with(
         OsStr::new(name),
         OsStr::new("--nocapture"),
         OsStr::new("--test-threads=1"),
+        OsStr::new("--include-ignored"),
     ];
     let env: Vec<(&str, &str)> = env.iter().copied().chain([(INSIDE, name)]).collect();
     for &n in counts {

@@ -7,6 +7,7 @@
 //! | `operators.rs` | the operators and functions known to both |
 
 mod grammar;
+
 mod operators;
 #[cfg(test)]
 mod tests;
@@ -15,6 +16,7 @@ use std::sync::Arc;
 
 use exmex::{Differentiate, Express, FlatEx};
 
+pub use grammar::vocabulary;
 use operators::Operators;
 
 /// Values of the variables. In 2D the third components are zero.

@@ -15,7 +15,7 @@ use crate::deck::model::{
 pub const SECTIONS: &[Section] = &[
     Section {
         name: "",
-        header: "top of the file",
+        header: "the top level",
         doc: "What a deck consists of.",
         keys: &[
             key("title", Text, Default("\"\""), "Shown in the banner and stored with the results."),
@@ -88,7 +88,7 @@ pub const SECTIONS: &[Section] = &[
                 Default("\"flip\""), "How points take their velocity from the grid (explicit)."),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
                 "Order m of XPIC(m).").range(at_least(1.0)),
-            key("drop_below", Number, Optional("1e-8 without Ghost stiffness, 0 with it"),
+            key("drop_below", Number, Optional("1e-12 without Ghost stiffness, 0 with it"),
                 "Nodes whose summed basis weight is below this fraction of the largest are held at zero.")
                 .range(between(0.0, 1.0)),
         ],

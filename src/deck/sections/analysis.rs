@@ -119,7 +119,7 @@ pub fn method(table: &Table<'_>, ghost: Option<&Option<Ghost>>) -> Got<Method> {
         stress_update: stress_update?,
         flip,
         xpic: xpic.then(|| order.unwrap_or(2)),
-        drop_below: drop_below?.unwrap_or(if stiffened { 0.0 } else { 1e-8 }),
+        drop_below: drop_below?.unwrap_or(if stiffened { 0.0 } else { 1e-12 }),
     })
 }
 

@@ -10,6 +10,9 @@ use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, POSITIVE};
 use crate::deck::tree::Value;
 
+/// Node numbers travel as 64-bit floats too, which hold whole numbers up to here.
+const MOST_NODES: usize = 1 << 53;
+
 /// The grid and the dimension of the problem.
 pub fn grid(table: &Table<'_>, directory: &Path) -> Got<(Grid, usize)> {
     if table.choice_of("type", &["lattice", "mesh"])? == 0 {
@@ -60,6 +63,11 @@ fn lattice(table: &Table<'_>) -> Got<(LatticeGrid, usize)> {
             .collect::<Got<_>>()?,
         (None, None) => return Err(table.missing("size", "or give cells")),
     };
+    let nodes = cells.iter().try_fold(1usize, |all, n| all.checked_mul(n.checked_add(1)?));
+    if nodes.is_none_or(|nodes| nodes > MOST_NODES) {
+        let message = format!("{cells:?} cells are more than can be numbered");
+        return Err(table.problem(extent, message));
+    }
     let origin = origin?.unwrap_or_else(|| vec![0.0; dimension]);
     Ok((LatticeGrid { origin, spacing, cells }, dimension))
 }

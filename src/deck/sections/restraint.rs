@@ -36,9 +36,7 @@ pub fn check(
             free.join(" and ")
         )
     };
-    let help = format!(
-        "for example: where = {{ side = \"left\" }}, fix = [{}]",
-        free.iter().map(|axis| format!("\"{axis}\"")).collect::<Vec<_>>().join(", ")
-    );
+    let fix = free.iter().map(|axis| format!("\"{axis}\"")).collect::<Vec<_>>().join(", ");
+    let help = format!("for example a [[boundary]] with fix = [{fix}]");
     Err(root.problems().report(&Origin::Nowhere, "boundary", message, help))
 }

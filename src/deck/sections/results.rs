@@ -1,11 +1,11 @@
 //! `[[verify]]`, `[output]`, `[parallel]`, `[petsc]`.
 
 use crate::deck::expression::Expression;
-use crate::deck::fields::{FIELD_NAMES, FIELDS, FieldRank, TENSOR_COMPONENTS};
+use crate::deck::fields::{FIELD_NAMES, FIELDS, FieldRank};
 use crate::deck::model::{Checkpoint, Every, Output, Parallel, Verify};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
-use crate::deck::schema::{self, AXES, at_least};
+use crate::deck::schema::{self, at_least};
 use crate::deck::tree::Value;
 
 pub fn verify(root: &Table<'_>, dimension: usize) -> Got<Vec<Verify>> {
@@ -41,9 +41,11 @@ fn components(table: &Table<'_>, dimension: usize) -> Got<(String, usize)> {
         return unknown(&field, FIELD_NAMES);
     };
     let known: Vec<String> = match rank {
+        FieldRank::Integer => {
+            return Err(table.problem("field", format!("\"{field}\" has no exact value")));
+        }
         FieldRank::Scalar => vec![base.to_string()],
-        FieldRank::Vector => AXES[..dimension].iter().map(|c| format!("{base}.{c}")).collect(),
-        FieldRank::Tensor => TENSOR_COMPONENTS.iter().map(|c| format!("{base}.{c}")).collect(),
+        _ => rank.components(dimension).iter().map(|c| format!("{base}.{c}")).collect(),
     };
     match (rank, component) {
         (FieldRank::Vector, None) => Ok((field, dimension)),

@@ -1,0 +1,143 @@
+//! b = -Div P(F(X)): the body force per initial volume that makes a given displacement field
+//! exact (method of manufactured solutions, Lagrangian §7.4).
+//!
+//! The field's first and second derivatives are symbolic; dP/dF is the material's own
+//! consistent tangent in the total frame, so any elastic model serves:
+//! Div P_i = (dP_iJ / dF_kL) u_k,LJ.
+
+use nalgebra::Matrix3;
+
+use crate::deck::Scope;
+use crate::deck::expression::{Expression, Variable};
+use crate::deck::model::Frame;
+use crate::error::{Error, Result};
+use crate::material::Material;
+use crate::mechanics::{self, StepStart};
+
+const AXES: [Variable; 3] = [Variable::InitialX, Variable::InitialY, Variable::InitialZ];
+
+/// A displacement field of X and s (or t) with its derivatives.
+#[derive(Debug, Clone)]
+pub struct Manufactured {
+    /// u_k,L at k * D + L
+    first: Vec<Expression>,
+    /// u_k,LJ at (k * D + L) * D + J
+    second: Vec<Expression>,
+}
+
+impl Manufactured {
+    /// Differentiates the field, one expression per axis. Error: a function without derivative.
+    pub fn new(field: &[Expression]) -> Result<Self> {
+        let dimension = field.len();
+        let wrong = |what: String| {
+            Error::Input(format!("load.manufactured: {what}; use smooth functions of X, Y, Z, s"))
+        };
+        let mut first = Vec::new();
+        let mut second = Vec::new();
+        for component in field {
+            for &axis in &AXES[..dimension] {
+                first.push(component.derivative(axis).map_err(wrong)?);
+            }
+        }
+        for gradient in &first {
+            for &axis in &AXES[..dimension] {
+                second.push(gradient.derivative(axis).map_err(wrong)?);
+            }
+        }
+        Ok(Manufactured { first, second })
+    }
+
+    /// Force per initial volume, N/m3, at the place and load factor in `scope`. Error: the field
+    /// makes the material yield there (the force would depend on the path), or turns it over.
+    pub fn force<const D: usize>(&self, material: &Material, scope: &Scope) -> Result<[f64; D]> {
+        let mut gradient = [[0.0; D]; D];
+        for k in 0..D {
+            for l in 0..D {
+                gradient[k][l] =
+                    self.first[k * D + l].value(scope) + if k == l { 1.0 } else { 0.0 };
+            }
+        }
+        let unstrained = Matrix3::identity();
+        let start = StepStart {
+            material,
+            deformation_gradient: &unstrained,
+            elastic_left_cauchy_green: &unstrained,
+            volume_initial: 1.0,
+        };
+        let (contribution, state) = mechanics::contribution(Frame::Total, &start, &gradient);
+        if state.plastic_increment > 0.0 || !state.stored_energy.is_finite() {
+            return Err(Error::Input(format!(
+                "load.manufactured: at X = {:?}, s = {} the field {}; a manufactured solution \
+                 must stay elastic and invertible",
+                &scope.initial[..D],
+                scope.load_factor,
+                if state.plastic_increment > 0.0 {
+                    "makes the material yield"
+                } else {
+                    "is singular"
+                },
+            )));
+        }
+        let mut force = [0.0; D];
+        for k in 0..D {
+            for l in 0..D {
+                for j in 0..D {
+                    let curvature = self.second[(k * D + l) * D + j].value(scope);
+                    for (i, f) in force.iter_mut().enumerate() {
+                        *f -= contribution.tangent[i][j][k][l] * curvature;
+                    }
+                }
+            }
+        }
+        Ok(force)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Hencky;
+
+    fn first_piola(material: &Material, field: &[Expression], scope: &Scope) -> [[f64; 2]; 2] {
+        let derivatives = Manufactured::new(field).expect("smooth");
+        let mut gradient = [[0.0; 2]; 2];
+        for k in 0..2 {
+            for l in 0..2 {
+                gradient[k][l] =
+                    derivatives.first[k * 2 + l].value(scope) + if k == l { 1.0 } else { 0.0 };
+            }
+        }
+        let unit = Matrix3::identity();
+        let start = StepStart {
+            material,
+            deformation_gradient: &unit,
+            elastic_left_cauchy_green: &unit,
+            volume_initial: 1.0,
+        };
+        mechanics::contribution(Frame::Total, &start, &gradient).0.stress
+    }
+
+    #[test]
+    fn force_is_minus_the_divergence_of_the_stress() {
+        let material = Material::Hencky(Hencky::new(1000.0, 0.3));
+        let field = [
+            Expression::parse("0.1*s*sin(2*X)*cos(Y)").expect("valid"),
+            Expression::parse("0.2*s*X*Y*Y").expect("valid"),
+        ];
+        let made = Manufactured::new(&field).expect("smooth");
+        let at =
+            |x: f64, y: f64| Scope { initial: [x, y, 0.0], load_factor: 0.7, ..Scope::default() };
+        let step = 1e-5;
+        for (x, y) in [(0.3, 0.2), (-0.4, 0.9), (0.0, 0.0)] {
+            let force: [f64; 2] = made.force(&material, &at(x, y)).expect("elastic");
+            let stress = |x, y| first_piola(&material, &field, &at(x, y));
+            for i in 0..2 {
+                let divergence = (stress(x + step, y)[i][0] - stress(x - step, y)[i][0]
+                    + stress(x, y + step)[i][1]
+                    - stress(x, y - step)[i][1])
+                    / (2.0 * step);
+                assert!((force[i] + divergence).abs() < 1e-5, "{} {}", force[i], divergence);
+            }
+        }
+    }
+}

@@ -1,0 +1,71 @@
+//! S_ip = sum_c w_c S_i(x_c), dS_ip = sum_c g_c S_i(x_c): what both CPDI functions share
+//! (Rotation §2 (iv)). They differ in the corners x_c, weights w_c and gradients g_c.
+//!
+//! A corner may stick out of the grid by up to a quarter of a cell ([`REACH`]): domains only
+//! approximate the body (parallelograms do not fit together, and a polygon that turns inside a
+//! round outline cuts other chords), while the functions of the outer cells, extended linearly,
+//! keep partition of unity and linear fields exact.
+
+use crate::error::{Error, Result};
+use crate::grid::locate::REACH;
+use crate::grid::{Grid, Interpolation};
+use crate::points::Points;
+
+use super::Row;
+
+/// Corners with their weights (sum 1) and gradients (1/m, sum 0), 2^D of them.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Corners<const D: usize> {
+    pub positions: [[f64; D]; 8],
+    pub weights: [f64; 8],
+    pub gradients: [[f64; D]; 8],
+}
+
+impl<const D: usize> Corners<D> {
+    /// Replaces `row` by the merged row of point `p`.
+    pub(super) fn fill(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        row: &mut Row<D>,
+    ) -> Result<()> {
+        row.clear();
+        for_each_place(grid, points, p, &self.positions, |corner, at| {
+            row.add_corner(at, self.weights[corner], &self.gradients[corner]);
+        })?;
+        row.merge();
+        Ok(())
+    }
+}
+
+/// Calls `visit` with each corner's number and the grid's basis there. Corners on a face count
+/// for the cell on the side of the domain's centre.
+///
+/// Error: a corner beyond reach, named by point, corner and position.
+pub(super) fn for_each_place<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    corners: &[[f64; D]; 8],
+    mut visit: impl FnMut(usize, &Interpolation<D>),
+) -> Result<()> {
+    let corners = &corners[..1 << D];
+    let centre =
+        std::array::from_fn(|a| corners.iter().map(|x| x[a]).sum::<f64>() / corners.len() as f64);
+    let mut hint = None;
+    for (corner, x) in corners.iter().enumerate() {
+        let at = grid.interpolate_towards(x, &centre, REACH, hint).ok_or_else(|| {
+            Error::Run(format!(
+                "corner {} of point {} is outside the grid at {x:?} m (the point is at {:?} m); \
+                 enlarge the grid, or let the mesh follow the body",
+                corner + 1,
+                points.id[p],
+                points.position[p]
+            ))
+        })?;
+        hint = Some(at.cell);
+        visit(corner, &at);
+    }
+    Ok(())
+}

@@ -1,0 +1,166 @@
+//! S_ip = (1/V) sum_c S_i(x_c) int N_c dV, dS_ip = (1/V) sum_c S_i(x_c) int dN_c/dx dV over the
+//! quadrilateral or hexahedron with corners x_c and its (bi- or tri)linear functions N_c
+//! (Rotation §2 (iv), Lagrangian footnote 6; Sadeghirad et al. 2013).
+//!
+//! In 2D both integrals have closed forms. Those printed by Rotation are the correct ones: with
+//! x = x_0 + A xi + C eta + B xi eta, det J = A x C + (A x B) xi + (B x C) eta, the integral of
+//! N_c det J is V/4 + (xi_c b + eta_c a)/24, where b = 8 A x B and a = 8 B x C are Rotation's.
+//! In 3D N_c det J and dN_c/dx det J are polynomials of degree three at most in each reference
+//! coordinate, so 2 x 2 x 2 Gauss points are exact.
+//!
+//! In 2D the area of the moved domain is det(1 + mean du/dx) times the old one: mean gradients
+//! map the diagonals exactly, and the area is half their cross product. Rotation's v_p is
+//! therefore [`Points::volume`]; in 3D the two differ at second order in the hexahedron's warp.
+
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::grid::element::{Element, determinant, inverse, jacobian};
+use crate::grid::quadrature::gauss_rule;
+use crate::points::Points;
+
+use super::Row;
+use super::corner::{Corners, for_each_place};
+
+/// Volume (area in 2D) of a domain, m^D; negative if it is inside out.
+pub fn volume<const D: usize>(corners: &[[f64; D]; 8]) -> f64 {
+    if D == 2 {
+        return area(corners);
+    }
+    let nodes = &corners[..8];
+    let rule = gauss_rule::<D>(Element::Hex8, 2);
+    let density = |xi| determinant(&jacobian(nodes, &Element::Hex8.shape_gradients(xi)));
+    rule.iter().map(|(xi, weight)| weight * density(xi)).sum()
+}
+
+/// Centroid of a domain, m: where its point belongs at the start.
+pub fn centroid<const D: usize>(corners: &[[f64; D]; 8]) -> [f64; D] {
+    let (weights, _, _) = integrals(corners);
+    position_of(corners, &weights)
+}
+
+fn position_of<const D: usize>(corners: &[[f64; D]; 8], weights: &[f64; 8]) -> [f64; D] {
+    std::array::from_fn(|a| corners.iter().zip(weights).map(|(x, w)| w * x[a]).sum())
+}
+
+/// Half the cross product of the diagonals.
+fn area<const D: usize>(x: &[[f64; D]; 8]) -> f64 {
+    0.5 * ((x[2][0] - x[0][0]) * (x[3][1] - x[1][1]) - (x[3][0] - x[1][0]) * (x[2][1] - x[0][1]))
+}
+
+/// Weights, gradients and volume of a domain.
+fn integrals<const D: usize>(x: &[[f64; D]; 8]) -> ([f64; 8], [[f64; D]; 8], f64) {
+    if D == 2 { quadrilateral(x) } else { hexahedron(x) }
+}
+
+/// Rotation §2 (iv), with its names a and b.
+fn quadrilateral<const D: usize>(x: &[[f64; D]; 8]) -> ([f64; 8], [[f64; D]; 8], f64) {
+    let v = area(x);
+    let [p1, p2, p3, p4] = [x[0], x[1], x[2], x[3]];
+    let a = (p4[0] - p1[0]) * (p2[1] - p3[1]) - (p2[0] - p3[0]) * (p4[1] - p1[1]);
+    let b = (p3[0] - p4[0]) * (p1[1] - p2[1]) - (p1[0] - p2[0]) * (p3[1] - p4[1]);
+    let mut weights = [0.0; 8];
+    let numerators = [6.0 * v - a - b, 6.0 * v - a + b, 6.0 * v + a + b, 6.0 * v + a - b];
+    for (weight, numerator) in weights.iter_mut().zip(numerators) {
+        *weight = numerator / (24.0 * v);
+    }
+    let mut gradients = [[0.0; D]; 8];
+    for corner in 0..4 {
+        let (next, before) = (x[(corner + 1) % 4], x[(corner + 3) % 4]);
+        gradients[corner][0] = (next[1] - before[1]) / (2.0 * v);
+        gradients[corner][1] = (before[0] - next[0]) / (2.0 * v);
+    }
+    (weights, gradients, v)
+}
+
+fn hexahedron<const D: usize>(x: &[[f64; D]; 8]) -> ([f64; 8], [[f64; D]; 8], f64) {
+    let (mut weights, mut gradients, mut volume) = ([0.0; 8], [[0.0; D]; 8], 0.0);
+    for (xi, gauss) in gauss_rule::<D>(Element::Hex8, 2) {
+        let dn = Element::Hex8.shape_gradients(&xi);
+        let j = jacobian(x, &dn);
+        let part = gauss * determinant(&j);
+        // A flat place has no volume to contribute.
+        let Some(inverse) = inverse(&j) else { continue };
+        volume += part;
+        for (c, n) in Element::Hex8.shape(&xi).iter().enumerate() {
+            weights[c] += part * n;
+            for (i, g) in gradients[c].iter_mut().enumerate() {
+                *g += part * (0..D).map(|k| dn[c][k] * inverse[k][i]).sum::<f64>();
+            }
+        }
+    }
+    (weights.map(|w| w / volume), gradients.map(|g| g.map(|g| g / volume)), volume)
+}
+
+/// Corners, weights and gradients of point `p`.
+///
+/// Error: a domain whose volume is not positive. A domain with a reflex angle still integrates
+/// to valid functions and is let through.
+pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D>> {
+    let positions = points.corners[p];
+    let (weights, gradients, volume) = integrals(&positions);
+    if !(volume > 0.0 && volume.is_finite()) {
+        return Err(Error::Run(format!(
+            "the CPDI2 domain of point {} at {:?} m is inverted: volume {volume:e} m{D}, corners \
+             {:?}; try smaller steps, or basis cpdi1 or mpm for such distortion",
+            points.id[p],
+            points.position[p],
+            &positions[..1 << D]
+        )));
+    }
+    Ok(Corners { positions, weights, gradients })
+}
+
+/// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending.
+///
+/// Errors: the domain is inverted; a corner outside the grid.
+pub fn influence<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    row: &mut Row<D>,
+) -> Result<()> {
+    corners(points, p)?.fill(grid, points, p, row)
+}
+
+/// Appends the cells that hold the corners of point `p`, ascending.
+pub fn populated_cells<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    out: &mut Vec<usize>,
+) -> Result<()> {
+    let start = out.len();
+    for_each_place(grid, points, p, &points.corners[p], |_, at| out.push(at.cell))?;
+    super::row::sort_tail(out, start);
+    Ok(())
+}
+
+/// Moves the corners of all points with the step's nodal displacement (m, zero where no
+/// equation lives), before the mesh moves (Rotation §2 (vii)). It is asked only for nodes in
+/// the point's own row. Corners that domains share stay shared up to round-off.
+///
+/// Errors: a corner outside the grid; a domain that is inverted by the displacement.
+pub fn update_corners<const D: usize>(
+    grid: &Grid<D>,
+    points: &mut Points<D>,
+    displacement: &dyn Fn(usize) -> [f64; D],
+) -> Result<()> {
+    for p in 0..points.len() {
+        let mut moved = points.corners[p];
+        for_each_place(grid, points, p, &points.corners[p], |corner, at| {
+            for (&node, &n) in at.nodes.iter().zip(&at.weights).take(at.count) {
+                let u = displacement(node);
+                for (x, u) in moved[corner].iter_mut().zip(&u) {
+                    *x += n * u;
+                }
+            }
+        })?;
+        points.corners[p] = moved;
+        corners(points, p)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "cpdi_tests.rs"]
+mod tests;

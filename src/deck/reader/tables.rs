@@ -1,0 +1,95 @@
+//! Tables inside tables.
+
+use super::Table;
+use crate::deck::problems::Got;
+use crate::deck::schema::{self, Kind, Need};
+use crate::deck::tree::Value;
+
+impl Table<'_> {
+    /// Runs `read` on a sub-table; `None` if it is absent (and required keys are reported).
+    pub fn table_if<T>(
+        &self,
+        name: &str,
+        read: impl FnOnce(Table<'_>) -> Got<T>,
+    ) -> Got<Option<T>> {
+        let key = self.key(name);
+        let (Kind::Table(section), path) = (key.kind, self.full(name)) else {
+            unreachable!("only keys of kind table are opened as tables")
+        };
+        match self.node(name) {
+            Some(node) => {
+                let table = Table::open(self.problems, schema::section(section), &path, node)?;
+                read(table).map(Some)
+            }
+            None if key.need == Need::Required => Err(self.missing(name, "")),
+            None => Ok(None),
+        }
+    }
+
+    /// As [`Table::table_if`] for tables that are needed here.
+    pub fn table<T>(&self, name: &str, read: impl FnOnce(Table<'_>) -> Got<T>) -> Got<T> {
+        self.present(name, self.table_if(name, read))
+    }
+
+    /// Runs `read` on a sub-table, on an empty one if it is absent.
+    pub fn table_or_default<T>(
+        &self,
+        name: &str,
+        read: impl FnOnce(Table<'_>) -> Got<T>,
+    ) -> Got<T> {
+        if self.given(name) {
+            return self.table(name, read);
+        }
+        let Kind::Table(section) = self.key(name).kind else {
+            unreachable!("only keys of kind table are opened as tables")
+        };
+        let path = self.full(name);
+        read(Table::absent(self.problems, schema::section(section), &path))
+    }
+
+    /// Runs `read` on each table of an array of tables; all are read before a problem returns.
+    pub fn tables<T>(
+        &self,
+        name: &str,
+        mut read: impl FnMut(usize, Table<'_>) -> Got<T>,
+    ) -> Got<Vec<T>> {
+        let key = self.key(name);
+        let Kind::Tables(section) = key.kind else {
+            unreachable!("only keys of kind tables are opened as arrays of tables")
+        };
+        let Some(node) = self.node(name) else { return Ok(Vec::new()) };
+        let Value::Array(items) = &node.value else { return Err(self.mismatch(key, node)) };
+        let all: Vec<Got<T>> = items
+            .iter()
+            .enumerate()
+            .map(|(index, item)| {
+                let path = format!("{}.{index}", self.full(name));
+                read(index, Table::open(self.problems, schema::section(section), &path, item)?)
+            })
+            .collect();
+        all.into_iter().collect()
+    }
+
+    /// Runs `read` on each named table below a key.
+    pub fn named<T>(
+        &self,
+        name: &str,
+        mut read: impl FnMut(&str, Table<'_>) -> Got<T>,
+    ) -> Got<Vec<T>> {
+        let key = self.key(name);
+        let Kind::Named(section) = key.kind else {
+            unreachable!("only keys of kind named are opened as named tables")
+        };
+        let Some(node) = self.node(name) else { return Ok(Vec::new()) };
+        let Value::Table(entries) = &node.value else { return Err(self.mismatch(key, node)) };
+        let all: Vec<Got<T>> = entries
+            .iter()
+            .map(|entry| {
+                let path = format!("{}.{}", self.full(name), entry.key);
+                let section = schema::section(section);
+                read(&entry.key, Table::open(self.problems, section, &path, &entry.node)?)
+            })
+            .collect();
+        all.into_iter().collect()
+    }
+}

@@ -1,0 +1,135 @@
+//! Words out of a list, and expressions.
+
+use super::Table;
+use crate::deck::expression::{Expression, Variable};
+use crate::deck::problems::{Got, Reported, nearest};
+use crate::deck::schema::{Key, Kind, quoted};
+use crate::deck::tree::{Node, Origin, Value};
+use crate::deck::words::Words;
+
+impl Table<'_> {
+    fn word<T: Words>(&self, name: &str, word: &str, origin: &Origin) -> Got<T> {
+        if let Some((_, value)) = T::WORDS.iter().find(|(known, _)| *known == word) {
+            return Ok(*value);
+        }
+        let names: Vec<&str> = T::WORDS.iter().map(|(known, _)| *known).collect();
+        Err(self.unknown_word(name, word, &names, origin))
+    }
+
+    /// Reports a word that is none of `known`.
+    pub fn unknown_word(
+        &self,
+        name: &str,
+        word: &str,
+        known: &[&str],
+        origin: &Origin,
+    ) -> Reported {
+        let help = nearest(word, known.iter().copied())
+            .map(|near| format!("did you mean \"{near}\"?"))
+            .unwrap_or_default();
+        let expected = match known {
+            [] => "nothing to choose from".to_string(),
+            [one] => format!("expected \"{one}\""),
+            _ => format!("expected one of {}", quoted(known)),
+        };
+        let message = format!("{expected}, found \"{word}\"");
+        self.problems.report(origin, &self.full(name), message, help)
+    }
+
+    /// An enumeration of the model.
+    pub fn choice<T: Words>(&self, name: &str) -> Got<T> {
+        self.present(name, self.choice_if(name))
+    }
+
+    pub fn choice_if<T: Words>(&self, name: &str) -> Got<Option<T>> {
+        self.read(name, |key, node| {
+            let text = self.text_in(key, node)?;
+            self.word(name, &text, &node.origin)
+        })
+    }
+
+    /// A word of the schema's list; `allowed` of them hold here.
+    pub fn choice_of(&self, name: &str, allowed: &[&str]) -> Got<usize> {
+        let at = self.read(name, |key, node| {
+            let text = self.text_in(key, node)?;
+            allowed
+                .iter()
+                .position(|known| *known == text)
+                .ok_or_else(|| self.unknown_word(name, &text, allowed, &node.origin))
+        });
+        self.present(name, at)
+    }
+
+    /// Positions in `allowed` of the words of an array, without repeats.
+    pub fn choices(&self, name: &str, allowed: &[&str]) -> Got<Vec<usize>> {
+        let found = self.read(name, |key, node| {
+            let mut chosen = Vec::new();
+            for item in self.items(key, node)? {
+                let text = self.text_in(&Key { kind: Kind::Text, ..*key }, item)?;
+                let Some(at) = allowed.iter().position(|known| *known == text) else {
+                    return Err(self.unknown_word(name, &text, allowed, &item.origin));
+                };
+                if chosen.contains(&at) {
+                    let message = format!("\"{text}\" is named twice");
+                    let full = self.full(name);
+                    return Err(self.problems.report(&item.origin, &full, message, String::new()));
+                }
+                chosen.push(at);
+            }
+            Ok(chosen)
+        });
+        Ok(found?.unwrap_or_default())
+    }
+
+    fn expression_in(&self, key: &Key, node: &Node, variables: &str) -> Got<Expression> {
+        if let Some(value) = node.number().filter(|value| value.is_finite()) {
+            return Ok(Expression::constant(value));
+        }
+        let Value::String(text) = &node.value else { return Err(self.mismatch(key, node)) };
+        let report = |message: String| {
+            self.problems.report(&node.origin, &self.full(key.name), message, String::new())
+        };
+        let expression = Expression::parse(text).map_err(report)?;
+        let foreign = Variable::ALL
+            .into_iter()
+            .find(|v| expression.depends_on(*v) && !variables.split(' ').any(|n| n == v.name()));
+        match foreign {
+            Some(v) => {
+                let name = v.name();
+                Err(report(format!("`{name}` is not known here; variables: {variables}")))
+            }
+            None => Ok(expression),
+        }
+    }
+
+    fn variables(key: &Key) -> &'static str {
+        match key.kind {
+            Kind::Expression(variables) | Kind::Expressions(variables) => variables,
+            _ => "X Y Z x y z s t",
+        }
+    }
+
+    pub fn expression_if(&self, name: &str) -> Got<Option<Expression>> {
+        self.read(name, |key, node| self.expression_in(key, node, Self::variables(key)))
+    }
+
+    /// A formula that must be a string, in the given variables.
+    pub fn formula(&self, name: &str, variables: &str) -> Got<Expression> {
+        self.present(
+            name,
+            self.read(name, |key, node| {
+                self.text_in(key, node)?;
+                self.expression_in(key, node, variables)
+            }),
+        )
+    }
+
+    pub fn expressions_if(&self, name: &str, dimension: usize) -> Got<Option<Vec<Expression>>> {
+        self.read(name, |key, node| {
+            let variables = Self::variables(key);
+            let one = Key { kind: Kind::Expression(variables), ..*key };
+            let items = self.per_axis(key, node, dimension)?;
+            items.iter().map(|item| self.expression_in(&one, item, variables)).collect()
+        })
+    }
+}

@@ -1,0 +1,245 @@
+//! From raw nodes and cells to a [`Mesh`] that is fit for use, or to a message that names what
+//! is wrong with it.
+//!
+//! | fault | found by |
+//! |---|---|
+//! | inverted or flat cell | det J <= 0 at a corner |
+//! | duplicate cell | two cells with the same nodes |
+//! | face of three cells | faces with the same nodes |
+//! | hanging or doubled node | a node on an outer face that is not one of the face's nodes |
+
+use std::collections::BTreeMap;
+
+use rustc_hash::FxHashMap;
+
+use crate::error::{Error, Result};
+
+use super::element::{self, Element};
+use super::locate::Bins;
+use super::mesh::{Mesh, smallest_edge};
+use super::topology::{OUTSIDE, ThirdCell, Topology};
+
+/// Raw contents of a mesh before it is checked.
+#[derive(Debug, Clone)]
+pub struct Draft<const D: usize> {
+    /// Source for messages, such as `"ring.msh"`.
+    pub name: String,
+    pub element: Element,
+    /// m
+    pub positions: Vec<[f64; D]>,
+    /// `element.node_count()` nodes per cell.
+    pub cells: Vec<u32>,
+    /// Numbers of nodes and cells in the source; empty: counted from 0 as here.
+    pub node_labels: Vec<u64>,
+    pub cell_labels: Vec<u64>,
+    pub node_sets: BTreeMap<String, Vec<u32>>,
+    pub cell_sets: BTreeMap<String, Vec<u32>>,
+}
+
+impl<const D: usize> Draft<D> {
+    /// Checks everything and builds neighbours and bins. Errors name the cell or node by its
+    /// number in the source, and its position.
+    pub fn finish(self) -> Result<Mesh<D>> {
+        if self.cells.is_empty() {
+            return Err(Error::Input(format!("{}: the mesh has no cells", self.name)));
+        }
+        if let Some(node) = self.positions.iter().position(|x| x.iter().any(|x| !x.is_finite())) {
+            let label = self.node(node);
+            return Err(Error::Input(format!("{}: {label} is not at a finite place", self.name)));
+        }
+        if let Some((cell, corner)) = first_inverted(self.element, &self.positions, &self.cells) {
+            return Err(self.inverted(cell, corner));
+        }
+        self.check_duplicates()?;
+        let topology = Topology::new(self.element, &self.cells, self.positions.len())
+            .map_err(|third| self.third_cell(&third))?;
+        let bins = Bins::new(self.element, &self.positions, &self.cells, &topology.neighbours);
+        self.check_hanging(&topology, &bins)?;
+        let Self { name, element, positions, cells, mut node_sets, mut cell_sets, .. } = self;
+        for set in node_sets.values_mut().chain(cell_sets.values_mut()) {
+            set.sort_unstable();
+            set.dedup();
+        }
+        Ok(Mesh {
+            size: smallest_edge(element, &positions, &cells),
+            initial: positions.clone(),
+            name,
+            element,
+            positions,
+            cells,
+            topology,
+            bins,
+            node_sets,
+            cell_sets,
+        })
+    }
+
+    fn nodes_of(&self, cell: usize) -> &[u32] {
+        let n = self.element.node_count();
+        &self.cells[cell * n..(cell + 1) * n]
+    }
+
+    fn node(&self, node: usize) -> String {
+        let label = self.node_labels.get(node).copied().unwrap_or(node as u64);
+        format!("node {label} at {:?}", self.positions[node])
+    }
+
+    fn cell(&self, cell: usize) -> String {
+        let label = self.cell_labels.get(cell).copied().unwrap_or(cell as u64);
+        let nodes: Vec<String> = self
+            .nodes_of(cell)
+            .iter()
+            .map(|&n| self.node_labels.get(n as usize).copied().unwrap_or(u64::from(n)).to_string())
+            .collect();
+        format!("cell {label} (nodes {})", nodes.join(", "))
+    }
+
+    fn inverted(&self, cell: usize, corner: usize) -> Error {
+        let at = self.node(self.nodes_of(cell)[corner] as usize);
+        let order = if D == 2 { "counter-clockwise" } else { "Gmsh's order" };
+        Error::Input(format!(
+            "{}: {} is inverted or flat (negative Jacobian) at {at}; list its nodes in {order} and \
+             keep all its angles below 180 degrees",
+            self.name,
+            self.cell(cell)
+        ))
+    }
+
+    fn third_cell(&self, ThirdCell(cells): &ThirdCell) -> Error {
+        let [a, b, c] = cells.map(|c| self.cell(c as usize));
+        Error::Input(format!(
+            "{}: {a}, {b} and {c} all have the same face; a face can have two cells at most",
+            self.name
+        ))
+    }
+
+    fn check_duplicates(&self) -> Result<()> {
+        let mut seen: FxHashMap<[u32; 8], usize> = FxHashMap::default();
+        for (cell, nodes) in self.cells.chunks_exact(self.element.node_count()).enumerate() {
+            let mut key = [u32::MAX; 8];
+            key[..nodes.len()].copy_from_slice(nodes);
+            key.sort_unstable();
+            if let Some(first) = seen.insert(key, cell) {
+                let (first, cell) = (self.cell(first), self.cell(cell));
+                return Err(Error::Input(format!(
+                    "{}: {cell} is a duplicate of {first}; remove one of them",
+                    self.name
+                )));
+            }
+        }
+        Ok(())
+    }
+
+    /// On a conforming mesh an outer face touches no nodes but its own. A hanging node makes
+    /// the faces around it outer ones, and so does a node that is there twice.
+    fn check_hanging(&self, topology: &Topology, bins: &Bins<D>) -> Result<()> {
+        let faces = self.element.faces();
+        let outer_faces = |cell: usize| {
+            let across = &topology.neighbours[cell * faces.len()..(cell + 1) * faces.len()];
+            let nodes = self.nodes_of(cell);
+            let outer = faces.iter().zip(across).filter(|(_, other)| **other == OUTSIDE);
+            outer.map(move |(face, _)| face.iter().map(|&a| nodes[a]).collect::<Vec<u32>>())
+        };
+        let mut nodes: Vec<u32> = (0..self.cells.len() / self.element.node_count())
+            .flat_map(outer_faces)
+            .flatten()
+            .collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        for node in nodes {
+            let p = self.positions[node as usize];
+            for &cell in bins.candidates(&p) {
+                for face in outer_faces(cell as usize).filter(|face| !face.contains(&node)) {
+                    let x: Vec<[f64; D]> =
+                        face.iter().map(|&n| self.positions[n as usize]).collect();
+                    let tolerance = 1e-8 * distance(&x[0], &x[1]);
+                    if distance_to_face(&x, &p) <= tolerance {
+                        let twin = (0..x.len()).find(|&k| distance(&x[k], &p) <= tolerance);
+                        return Err(self.hanging(node, cell, twin.map(|k| face[k])));
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn hanging(&self, node: u32, cell: u32, twin: Option<u32>) -> Error {
+        let (node, cell) = (self.node(node as usize), self.cell(cell as usize));
+        Error::Input(match twin {
+            Some(twin) => format!(
+                "{}: {node} and {} of {cell} are at the same place; merge coincident nodes",
+                self.name,
+                self.node(twin as usize)
+            ),
+            None => format!(
+                "{}: {node} hangs on a face of {cell}; cells must meet at whole faces",
+                self.name
+            ),
+        })
+    }
+}
+
+/// The first cell, and its corner, where det J is not clearly positive.
+pub(super) fn first_inverted<const D: usize>(
+    element: Element,
+    positions: &[[f64; D]],
+    cells: &[u32],
+) -> Option<(usize, usize)> {
+    let corners = element.node_count();
+    let gradients: Vec<[[f64; D]; 8]> =
+        (0..corners).map(|a| element.shape_gradients(&element.reference_node(a))).collect();
+    for (cell, nodes) in cells.chunks_exact(corners).enumerate() {
+        let x: Vec<[f64; D]> = nodes.iter().map(|&n| positions[n as usize]).collect();
+        for (corner, dn) in gradients.iter().enumerate() {
+            let j = element::jacobian(&x, dn);
+            // Hadamard: |det J| is at most the product of the columns' lengths.
+            let bound: f64 =
+                (0..D).map(|c| j.iter().map(|row| row[c] * row[c]).sum::<f64>().sqrt()).product();
+            let det = element::determinant(&j);
+            if det.is_nan() || det <= 1e-10 * bound {
+                return Some((cell, corner));
+            }
+        }
+    }
+    None
+}
+
+fn distance<const D: usize>(p: &[f64; D], q: &[f64; D]) -> f64 {
+    p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum::<f64>().sqrt()
+}
+
+/// Distance of `p` from an edge, a triangle, or a quadrilateral (as its two triangles).
+fn distance_to_face<const D: usize>(face: &[[f64; D]], p: &[f64; D]) -> f64 {
+    match *face {
+        [a, b] => distance_to_edge(&a, &b, p),
+        [a, b, c] => distance_to_triangle(&a, &b, &c, p),
+        [a, b, c, d] => {
+            distance_to_triangle(&a, &b, &c, p).min(distance_to_triangle(&a, &c, &d, p))
+        }
+        _ => f64::INFINITY,
+    }
+}
+
+fn distance_to_edge<const D: usize>(a: &[f64; D], b: &[f64; D], p: &[f64; D]) -> f64 {
+    let along = |q: &[f64; D]| -> f64 { (0..D).map(|i| (q[i] - a[i]) * (b[i] - a[i])).sum() };
+    let t = (along(p) / along(b)).clamp(0.0, 1.0);
+    distance(&std::array::from_fn(|i| a[i] + t * (b[i] - a[i])), p)
+}
+
+fn distance_to_triangle<const D: usize>(
+    a: &[f64; D],
+    b: &[f64; D],
+    c: &[f64; D],
+    p: &[f64; D],
+) -> f64 {
+    let [u, v, w] = [b, c, p].map(|q| -> [f64; D] { std::array::from_fn(|i| q[i] - a[i]) });
+    let dot = |x: &[f64; D], y: &[f64; D]| -> f64 { x.iter().zip(y).map(|(x, y)| x * y).sum() };
+    let (uu, uv, vv, wu, wv) = (dot(&u, &u), dot(&u, &v), dot(&v, &v), dot(&w, &u), dot(&w, &v));
+    let det = uu * vv - uv * uv;
+    let (s, t) = ((wu * vv - wv * uv) / det, (wv * uu - wu * uv) / det);
+    if s >= 0.0 && t >= 0.0 && s + t <= 1.0 {
+        let foot = std::array::from_fn(|i| a[i] + s * u[i] + t * v[i]);
+        return distance(&foot, p);
+    }
+    distance_to_edge(a, b, p).min(distance_to_edge(b, c, p)).min(distance_to_edge(c, a, p))
+}

@@ -1,0 +1,133 @@
+//! The grid's own basis S_i(x) and its gradient at a place, on either grid (Ghost §2.5).
+
+use super::element;
+use super::lattice::CELL_CORNERS;
+use super::locate::{EDGE_TOLERANCE, REACH};
+use super::{Grid, Lattice, Mesh};
+
+/// The basis at one place: a cell and its nodes in cell order.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interpolation<const D: usize> {
+    pub cell: usize,
+    /// How many entries of the arrays count.
+    pub count: usize,
+    /// Global node numbers.
+    pub nodes: [usize; 8],
+    /// N_a(x)
+    pub weights: [f64; 8],
+    /// dN_a/dx, 1/m
+    pub gradients: [[f64; D]; 8],
+}
+
+impl<const D: usize> Grid<D> {
+    /// The basis at `x`; `None` outside the grid (beyond a relative 5e-10 of a cell, which
+    /// round-off of a point on the edge stays below). An `allowance` > 0 extends the outer
+    /// cells' own functions by that fraction of their extent (at most [`REACH`]); linear fields
+    /// stay exact there. A `hint` is the cell `x` is likely to be in; it never changes the
+    /// answer.
+    pub fn interpolate(
+        &self,
+        x: &[f64; D],
+        allowance: f64,
+        hint: Option<usize>,
+    ) -> Option<Interpolation<D>> {
+        match self {
+            Grid::Lattice(lattice) => {
+                Some(basis_on_lattice(lattice, lattice_cell(lattice, x, allowance)?, x))
+            }
+            Grid::Mesh(mesh) => {
+                let (cell, xi) = mesh.locate_near(x, allowance, hint)?;
+                basis_on_mesh(mesh, cell, &xi)
+            }
+        }
+    }
+
+    /// As [`Self::interpolate`] for a place on the rim of a region about `centre`: on a face of
+    /// the grid the cell on the side of `centre` is taken, so that a region which fills its
+    /// cells does not reach into those it merely touches.
+    pub fn interpolate_towards(
+        &self,
+        x: &[f64; D],
+        centre: &[f64; D],
+        allowance: f64,
+        hint: Option<usize>,
+    ) -> Option<Interpolation<D>> {
+        const NUDGE: f64 = 1e-6;
+        let inner = std::array::from_fn(|a| x[a] + NUDGE * (centre[a] - x[a]));
+        match self {
+            Grid::Lattice(lattice) => {
+                // The place itself must be within reach, too.
+                lattice_cell(lattice, x, allowance)?;
+                let cell = lattice_cell(lattice, &inner, allowance)?;
+                Some(basis_on_lattice(lattice, cell, x))
+            }
+            Grid::Mesh(mesh) => {
+                let (cell, _) = mesh.locate_near(&inner, allowance, hint)?;
+                let positions = mesh.cell_positions(cell);
+                let nodes = &positions[..mesh.element.node_count()];
+                let xi = element::inverse_map(mesh.element, nodes, x)?;
+                basis_on_mesh(mesh, cell, &xi)
+            }
+        }
+    }
+}
+
+/// Index of the cell that holds `x`, or of the outer one within reach.
+fn lattice_cell<const D: usize>(
+    lattice: &Lattice<D>,
+    x: &[f64; D],
+    allowance: f64,
+) -> Option<[usize; D]> {
+    let reach = allowance.clamp(EDGE_TOLERANCE, REACH);
+    let mut low = [0; D];
+    for axis in 0..D {
+        let t = lattice.scaled(axis, x[axis]);
+        let n = lattice.cells[axis];
+        if !(t >= -reach && t <= n as f64 + reach) {
+            return None;
+        }
+        low[axis] = (t.max(0.0) as usize).min(n - 1);
+    }
+    Some(low)
+}
+
+fn basis_on_lattice<const D: usize>(
+    lattice: &Lattice<D>,
+    low: [usize; D],
+    x: &[f64; D],
+) -> Interpolation<D> {
+    let local: [f64; D] = std::array::from_fn(|a| lattice.scaled(a, x[a]) - low[a] as f64);
+    let mut out = Interpolation {
+        cell: lattice.cell_at(low),
+        count: 1 << D,
+        nodes: [0; 8],
+        weights: [0.0; 8],
+        gradients: [[0.0; D]; 8],
+    };
+    for (a, corner) in CELL_CORNERS.iter().enumerate().take(1 << D) {
+        let factor = |axis: usize| if corner[axis] == 1 { local[axis] } else { 1.0 - local[axis] };
+        out.nodes[a] = lattice.node_at(std::array::from_fn(|axis| low[axis] + corner[axis]));
+        out.weights[a] = (0..D).map(factor).product();
+        out.gradients[a] = std::array::from_fn(|axis| {
+            let others: f64 = (0..D).filter(|&b| b != axis).map(factor).product();
+            let slope = if corner[axis] == 1 { 1.0 } else { -1.0 };
+            slope * others / lattice.spacing[axis]
+        });
+    }
+    out
+}
+
+fn basis_on_mesh<const D: usize>(
+    mesh: &Mesh<D>,
+    cell: usize,
+    xi: &[f64; D],
+) -> Option<Interpolation<D>> {
+    let count = mesh.element.node_count();
+    let positions = mesh.cell_positions(cell);
+    let (gradients, _) = element::gradients(mesh.element, &positions[..count], xi)?;
+    let mut nodes = [0; 8];
+    for (out, &node) in nodes.iter_mut().zip(mesh.nodes_of(cell)) {
+        *out = node as usize;
+    }
+    Some(Interpolation { cell, count, nodes, weights: mesh.element.shape(xi), gradients })
+}

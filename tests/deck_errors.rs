@@ -1,0 +1,441 @@
+//! Decks that are wrong: the messages, word for word.
+
+use std::path::Path;
+
+use mpm_par::deck;
+
+const BEAM: &str = include_str!("decks/beam.toml");
+const COLLISION: &str = include_str!("decks/collision.toml");
+const ANNULUS: &str = include_str!("decks/annulus.toml");
+const CUBE: &str = include_str!("decks/cube.toml");
+
+fn message(text: &str, sets: &[&str]) -> String {
+    let sets: Vec<String> = sets.iter().map(|set| (*set).to_string()).collect();
+    let error = deck::read(Path::new("beam.toml"), text, &sets).expect_err("a faulty deck");
+    assert_eq!(error.exit_code(), 2);
+    error.to_string()
+}
+
+/// The beam with one piece of text replaced.
+fn replaced(from: &str, to: &str) -> String {
+    assert!(BEAM.contains(from), "{from}");
+    message(&BEAM.replacen(from, to, 1), &[])
+}
+
+#[test]
+fn malformed_toml() {
+    assert_eq!(
+        replaced("steps = 50", "steps = = 50"),
+        "\
+beam.toml:5:9: not valid TOML: extra `=`, expected nothing
+   |
+ 5 | steps = = 50
+   |         ^"
+    );
+    for text in ["[analysis", "a = 1\na = 2", "x = 99999999999999999999", "\u{0}", "x = {"] {
+        let found = message(text, &[]);
+        assert!(found.contains("beam.toml:") && found.contains("not valid TOML: "), "{found}");
+    }
+}
+
+#[test]
+fn unknown_key_names_the_nearest() {
+    assert_eq!(
+        replaced("tolerance = 1e-9", "tolerence = 1e-9"),
+        "\
+beam.toml:6:1: analysis.tolerence: unknown key \"tolerence\"
+   |
+ 6 | tolerence = 1e-9
+   | ^^^^^^^^^
+   = did you mean \"tolerance\"?
+   = known keys of [analysis]: type, steps, duration, cfl, tolerance, max_iterations, on_failure, \
+smallest_step, inverted_iterates, newmark_beta, newmark_gamma, hht_alpha"
+    );
+}
+
+#[test]
+fn key_of_another_section_is_sent_there() {
+    assert_eq!(
+        replaced("poisson = 0.2", "poisson = 0.2\ndensity = 1"),
+        "\
+beam.toml:29:1: material.steel.density: unknown key \"density\"
+    |
+ 29 | density = 1
+    | ^^^^^^^
+   = \"density\" belongs to [[body]]
+   = known keys of [material.NAME]: model, young, poisson, yield"
+    );
+}
+
+#[test]
+fn wrong_type() {
+    assert_eq!(
+        replaced("tolerance = 1e-9", "tolerance = \"small\""),
+        "\
+beam.toml:6:13: analysis.tolerance: expected a number > 0, found the string \"small\"
+   |
+ 6 | tolerance = \"small\"
+   |             ^^^^^^^"
+    );
+}
+
+#[test]
+fn poisson_of_a_half() {
+    assert_eq!(
+        replaced("poisson = 0.2", "poisson = 0.5"),
+        "\
+beam.toml:28:11: material.steel.poisson: expected a number > -1 and < 0.5, found 0.5
+    |
+ 28 | poisson = 0.5
+    |           ^^^"
+    );
+}
+
+#[test]
+fn unknown_word() {
+    assert_eq!(
+        replaced("basis = \"gimp\"", "basis = \"gmip\""),
+        "\
+beam.toml:12:9: method.basis: expected one of \"mpm\", \"gimp\", \"cpdi1\", \"cpdi2\", found \"gmip\"
+    |
+ 12 | basis = \"gmip\"
+    |         ^^^^^^
+   = did you mean \"gimp\"?"
+    );
+}
+
+#[test]
+fn wrong_dimension() {
+    assert_eq!(
+        replaced("max = [10, 10]", "max = [10, 10, 1]"),
+        "\
+beam.toml:33:39: body.0.shape.box.max: expected 2 values, one per axis (2D, from [grid]), found 3
+    |
+ 33 | shape = { box = { min = [0, 9], max = [10, 10, 1] } }
+    |                                       ^^^^^^^^^^^"
+    );
+}
+
+#[test]
+fn size_that_is_not_whole_cells() {
+    assert_eq!(
+        replaced("size = [11.0, 10.0]", "size = [11.3, 10.0]"),
+        "\
+beam.toml:22:8: grid.size: expected whole cells, found 11.3 m along x with h = 0.5 m, which is \
+22.600000 cells; nearest: 11 or 11.5 m
+    |
+ 22 | size = [11.3, 10.0]
+    |        ^^^^^^^^^^^^"
+    );
+}
+
+#[test]
+fn missing_section_and_its_misspelling() {
+    assert_eq!(
+        replaced("[grid]\n", "[gird]\n"),
+        "\
+beam.toml:19:2: gird: unknown key \"gird\"
+    |
+ 19 | [gird]
+    |  ^^^^
+   = did you mean \"grid\"?
+   = known keys of the top level: title, analysis, method, ghost, grid, material, body, boundary, \
+load, verify, output, parallel, petsc, conditioning
+beam.toml: grid: missing section [grid]
+   = Background grid."
+    );
+    assert_eq!(
+        message("", &[]),
+        "\
+beam.toml: analysis: missing section [analysis]
+   = What is solved, and how finely.
+beam.toml: material: missing tables, each under a name of its own; expected a [material.NAME]
+   = At least one `[material.NAME]`.
+beam.toml: grid: missing section [grid]
+   = Background grid."
+    );
+}
+
+#[test]
+fn no_boundary_condition_is_a_singular_system() {
+    assert_eq!(
+        message(BEAM, &["boundary="]),
+        "\
+beam.toml: boundary: no [[boundary]]: nothing holds the bodies, so that the quasi-static system \
+is singular (any rigid motion solves it)
+   = for example a [[boundary]] with fix = [\"x\", \"y\"]"
+    );
+    assert_eq!(
+        message(BEAM, &["boundary.1="]),
+        "\
+beam.toml: boundary: no [[boundary]] holds y: the bodies can move rigidly along it, so that the \
+quasi-static system is singular
+   = for example a [[boundary]] with fix = [\"y\"]"
+    );
+}
+
+#[test]
+fn options_are_named_in_messages() {
+    assert_eq!(
+        message(BEAM, &["method.frame=total", "analysis.steps=0"]),
+        "--set analysis.steps=0: analysis.steps: expected a whole number >= 1, found 0"
+    );
+    assert_eq!(
+        message(BEAM, &["method.basis"]),
+        "--set method.basis: expected KEY=VALUE, for example --set method.basis=gimp"
+    );
+}
+
+#[test]
+fn several_problems_are_told_at_once_in_the_order_of_the_text() {
+    let text = BEAM
+        .replacen("steps = 50", "steps = -1", 1)
+        .replacen("young = 12e6", "young = 0", 1)
+        .replacen("force = [0, -100e3]", "force = [0]", 1);
+    let found = message(&text, &["output.every=0"]);
+    let starts: Vec<&str> = found.lines().filter(|line| !line.starts_with(' ')).collect();
+    assert_eq!(
+        starts,
+        [
+            "beam.toml:5:9: analysis.steps: expected a whole number >= 1, found -1",
+            "beam.toml:27:9: material.steel.young: expected a number > 0 (Pa), found 0",
+            "beam.toml:46:70: load.0.point.force: expected 2 values, one per axis (2D, from [grid]), found 1",
+            "--set output.every=0: output.every: expected a whole number of steps, or { seconds = s } >= 1, found 0",
+        ]
+    );
+    let many: String = (0..14).map(|i| format!("unknown{i} = 1\n")).collect();
+    let found = message(&(many + BEAM), &[]);
+    assert_eq!(found.matches("unknown key").count(), 10);
+    assert!(found.ends_with("... and 4 more"), "{found}");
+}
+
+/// (options, part of the message)
+type Cases<'a> = &'a [(&'a [&'a str], &'a str)];
+
+fn expect(text: &str, cases: Cases<'_>) {
+    for (sets, part) in cases {
+        let found = message(text, sets);
+        assert!(found.contains(part), "{sets:?}\nexpected: {part}\nfound: {found}");
+    }
+}
+
+#[test]
+fn checks_of_the_analysis_and_the_method() {
+    expect(
+        BEAM,
+        &[
+            (&["analysis.type=static"], "expected one of \"quasi-static\", \"explicit\""),
+            (&["analysis.steps="], "analysis.steps: missing a whole number >= 1"),
+            (&["analysis.steps=5.0"], "expected a whole number >= 1, found 5.0"),
+            (&["analysis.duration=1"], "type = \"quasi-static\" has no time"),
+            (&["analysis.tolerance=nan"], "expected a number > 0, found NaN"),
+            (&["analysis.tolerance=inf"], "expected a number > 0, found inf"),
+            (&["analysis.type=conditioning", "body.0.density=1"], "missing section [conditioning]"),
+            (
+                &["conditioning.displacement=[1, 0]"],
+                "only for analysis.type = \"conditioning\", found \"quasi-static\"",
+            ),
+            (
+                &["method.velocity_update=1.5"],
+                "number from 0 (pic) to 1 (flip) >= 0 and <= 1, found 1.5",
+            ),
+            (&["method.velocity_update=flop"], "did you mean \"flip\"?"),
+            (&["method.xpic_order=3"], "only with velocity_update = \"xpic\""),
+            (&["ghost.stiffness_factor=1"], "stiffness is given too"),
+            (&["ghost.stiffness="], "expected a stiffness or a mass"),
+            (&["parallel.rebalance_above=0.5"], "expected 0 (never) or a number >= 1"),
+            (&["petsc.a=[1]"], "petsc.a: expected a string, number or true"),
+            (&["output.fields=[\"stresses\"]"], "did you mean \"stress\"?"),
+            (&["output.fields=[\"stress\", \"stress\"]"], "\"stress\" is named twice"),
+            (&["output.checkpoint={ keep = 3 }"], "expected \"every\" (steps), \"minutes\""),
+        ],
+    );
+    expect(
+        CUBE,
+        &[
+            (&["analysis.duration="], "type = \"implicit-dynamic\" needs it"),
+            (&["analysis.cfl=0.5"], "only type = \"explicit\" takes it"),
+            (
+                &["body.0.density=0"],
+                "expected > 0 kg/m3: analysis.type = \"implicit-dynamic\" needs mass",
+            ),
+            (&["body.0.density="], "needs mass"),
+            (&["analysis.hht_alpha=-0.5"], "analysis.hht_alpha: expected a number >= -0.333"),
+            (
+                &["analysis.hht_alpha=-0.1", "analysis.newmark_beta=0.25"],
+                "hht_alpha = -0.1 sets it to",
+            ),
+            (&["analysis.newmark_gamma=0.6"], "expected at least (gamma + 1/2)^2 / 4"),
+        ],
+    );
+    expect(
+        COLLISION,
+        &[
+            (&["analysis.steps=10"], "steps and cfl exclude each other"),
+            (&["analysis.cfl="], "analysis.steps: missing a whole number >= 1; or give cfl"),
+        ],
+    );
+}
+
+#[test]
+fn checks_of_the_grid() {
+    expect(
+        BEAM,
+        &[
+            (&["grid.h=[0.5, 0.5, 0.5]"], "expected 2 values, as many as size has, found 3"),
+            (&["grid.cells=[1, 1]"], "expected only one of \"size\", \"cells\""),
+            (&["grid.size=[1]"], "expected 2 (plane strain) or 3 values, found 1"),
+            (&["grid.h=0"], "grid.h: expected a number"),
+            (&["grid.h="], "type = \"lattice\" needs it"),
+            (&["grid.motion={ follow = \"material\" }"], "only for type = \"mesh\""),
+            (&["grid.type=mesh"], "only for type = \"lattice\""),
+            (&["grid.size=", "grid.cells=[9000000000, 9000000000]"], "more than can be numbered"),
+            (&["grid.h=3"], "nearest: 9 or 12 m"),
+        ],
+    );
+    expect(
+        ANNULUS,
+        &[
+            (&["method.basis=gimp"], "method.basis = \"gimp\" needs type = \"lattice\""),
+            (&["grid.generate.annulus.inner=11"], "expected a hole smaller than outer = 10 m"),
+            (&["grid.generate.annulus.inner=[1, 2, 3]"], "a radius, or an array of two semi-axes"),
+            (&["grid.generate.annulus.element=hex8"], "expected one of \"quad4\", \"tri3\""),
+            (&["grid.generate.annulus.element=quad"], "did you mean \"quad4\"?"),
+            (
+                &["boundary.0.rotation=", "boundary.0.fix=[\"x\"]"],
+                "no [[boundary]] with where = { tag = \"inner\" } prescribes a rotation",
+            ),
+            (&["grid.motion={ follow = [\"z\"] }"], "expected one of \"x\", \"y\", found \"z\""),
+            (&["grid.motion={ follow = \"x\" }"], "expected \"material\", found \"x\""),
+            (
+                &["boundary.0.where.tag=inside"],
+                "expected one of \"inner\", \"outer\", found \"inside\"",
+            ),
+            (&["boundary.0.where={ side = \"left\" }"], "a mesh has no sides"),
+            (&["body.0.gauss=2", "body.0.points_per_cell="], "Gauss points are finite elements"),
+        ],
+    );
+}
+
+#[test]
+fn checks_of_bodies_and_shapes() {
+    expect(
+        BEAM,
+        &[
+            (&["material.steel.yield=1"], "only for model = \"von-mises\""),
+            (
+                &["material.steel.model=von-mises"],
+                "material.steel.yield: missing a number > 0; model = \"von-mises\" needs it",
+            ),
+            (&["material.steel.poisson=-1"], "expected a number > -1 and < 0.5"),
+            (&["material=7"], "material: expected tables, each under a name of its own, found 7"),
+            (&["body.0.material=stel"], "expected \"steel\", found \"stel\""),
+            (&["body="], "body: missing an array of tables; expected a [[body]]"),
+            (&["body.0.density=-1"], "body.0.density: expected a number >= 0 (kg/m3), found -1"),
+            (&["body.0.points_per_cell=[2]"], "expected 2 values, one per axis"),
+            (
+                &["body.0.points_per_cell=0"],
+                "expected a whole number, or an array of one per axis >= 1",
+            ),
+            (
+                &["body.0.lattice={ spacing = 0.1 }"],
+                "expected only one of \"points_per_cell\", \"lattice\"",
+            ),
+            (
+                &["body.0.points_per_cell=", "body.0.lattice={ spacing = 0.6 }"],
+                "a domain may not be larger than a cell, found 0.6 m",
+            ),
+            (&["body.0.velocity=[\"x\", 0]"], "`x` is not known here; variables: X Y Z"),
+            (&["body.0.shape={}"], "expected one of \"box\", \"disc\""),
+            (&["body.0.shape.where=\"x < 1\""], "expected only one of \"box\", \"where\""),
+            (&["body.0.shape={ where = \"1 < 2\" }"], "found a constant"),
+            (&["body.0.shape={ where = \"x < \" }"], "in \"x < \", character 5: expected a number"),
+            (&["body.0.shape={ where = \"z < 1\" }"], "`z` is not known here"),
+            (
+                &["body.0.shape.translate=[20, 0]"],
+                "the body lies outside the grid: x from 20 to 30 m, the grid from 0 to 11 m",
+            ),
+            (&["body.0.shape.box.max=[0, 10]"], "expected more than min = 0 along x, found 0"),
+            (
+                &["body.0.shape={ disc = { centre = [1, 1], radius = 0 } }"],
+                "body.0.shape.disc.radius: expected a number > 0 (m), found 0",
+            ),
+            (
+                &["body.0.shape={ polygon = { vertices = [[0, 0], [1, 0]] } }"],
+                "expected 3 or more corners, found 2",
+            ),
+            (
+                &["body.0.shape={ difference = [{ box = { min = [0, 0], max = [1, 1] } }] }"],
+                "expected 2 or more shapes, found 1",
+            ),
+            (
+                &["body.0.shape={ union = [{ bx = 1 }] }"],
+                "body.0.shape.union.0.bx: unknown key \"bx\"",
+            ),
+            (&["body.0.shape={ union = [{ points = \"a.csv\" }] }"], "only directly in a body"),
+            (&["body.0.shape={ points = \"a.csv\" }"], "points come from a file"),
+            (&["body.0.shape={ cells = \"all\" }"], "only for grid.type = \"mesh\""),
+        ],
+    );
+    expect(COLLISION, &[(&["body.1.name=left"], "another body is called \"left\"")]);
+    expect(
+        CUBE,
+        &[(
+            &["body.0.shape={ polygon = { vertices = [[0, 0], [1, 0], [1, 1]] } }"],
+            "polygons are 2D",
+        )],
+    );
+}
+
+#[test]
+fn checks_of_conditions_and_results() {
+    expect(
+        BEAM,
+        &[
+            (
+                &["boundary.0.fix=[\"z\"]"],
+                "boundary.0.fix: expected one of \"x\", \"y\", found \"z\"",
+            ),
+            (&["boundary.0.fix=[]"], "prescribes nothing"),
+            (&["boundary.0.displacement={ x = 1 }"], "x is held by fix and displaced too"),
+            (&["boundary.0.displacement={ z = 1 }"], "the problem is 2D"),
+            (
+                &["boundary.0.displacement={ y = \"x\" }"],
+                "`x` is not known here; variables: X Y Z s t",
+            ),
+            (&["boundary.0.rotation={ degrees = 1 }"], "x and y are prescribed already"),
+            (
+                &["boundary.0.where.side=front"],
+                "expected one of \"left\", \"right\", \"bottom\", \"top\", found \"front\"",
+            ),
+            (&["boundary.0.where={ tag = \"left\" }"], "a lattice has no tags"),
+            (&["boundary.0.where={ cells_of = \"bean\" }"], "did you mean \"beam\"?"),
+            (&["boundary.1.name=root"], "another boundary is called \"root\""),
+            (&["load.0.point.body=bean"], "load.0.point.body: expected \"beam\", found \"bean\""),
+            (&["load.0.point.nearest=[]"], "expected one or more positions, found none"),
+            (
+                &["load.0.point=", "load.0.gravity=[0, -10]"],
+                "acts on nothing: every body has density 0",
+            ),
+            (&["load.0.gravity=[0, -10]"], "expected only one of \"point\", \"gravity\""),
+            (&["verify.0.field=stress"], "expected one of \"stress.xx\", \"stress.xy\""),
+            (&["verify.0.field=strss.yy"], "verify.0.field: expected one of \"displacement\""),
+            (
+                &["verify.0.field=displacement"],
+                "\"displacement\" has 2 component(s), found 1 value(s)",
+            ),
+            (
+                &["verify.0.exact=80*1O*(Y-50)"],
+                "in \"80*1O*(Y-50)\", character 5: expected an operator or the end, found `O`",
+            ),
+            (&["verify.0.scale=0"], "verify.0.scale: expected a number > 0"),
+        ],
+    );
+    expect(
+        COLLISION,
+        &[(
+            &["load=[{ point = { nearest = [0, 0], force = [0, 1] } }]"],
+            "the deck has several bodies",
+        )],
+    );
+}
