@@ -205,7 +205,7 @@ impl<const D: usize> Task<'_, D> {
 
 /// Stress and tangent of a point; `None`, and a note in `health`, if the stress is not finite.
 #[inline(always)]
-fn respond<const D: usize>(
+pub(super) fn respond<const D: usize>(
     step: StepPoints<'_, D>,
     frame: Frame,
     p: usize,
@@ -250,7 +250,3 @@ pub fn deformation_increment<const D: usize>(
     }
     increment
 }
-
-#[cfg(test)]
-#[path = "internal_tests.rs"]
-mod tests;

@@ -12,6 +12,7 @@
 //! | `kernel.rs` | the same sums, tiled for vector registers |
 //! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
 //! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
+//! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
@@ -30,6 +31,7 @@ pub mod node_index;
 pub mod numbering;
 pub mod pattern;
 pub mod places;
+pub mod plain;
 pub mod populated;
 pub mod scatter;
 
