@@ -16,7 +16,7 @@ use crate::points::Points;
 use super::balance::imbalance;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
-use super::equilibrium::{expand_ghost, ghost_matrix};
+use super::equilibrium::{add_scalar, ghost_matrix};
 use super::extremes::{self, Extremes};
 use super::mapping;
 use super::reactions::reactions;
@@ -152,9 +152,7 @@ impl<const D: usize> System<D> {
         stiffness.reduce(world, pattern)?;
         let mut stiffness_ghost = stiffness.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.stiffness)? {
-            let mut expanded = BlockMatrix::<D>::zeros(pattern);
-            expand_ghost(&share, pattern, &mut expanded);
-            add(&mut stiffness_ghost.values, &expanded.values);
+            add_scalar(&share, pattern, &mut stiffness_ghost);
         }
         Ok(System { mass, mass_ghost, lumped, stiffness, stiffness_ghost })
     }

@@ -20,7 +20,7 @@ use crate::petsc::session::{self, Session};
 
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder};
-use super::{conditioning, explicit, quasi_static};
+use super::{conditioning, explicit, implicit_dynamic, quasi_static};
 use super::{plan, setup};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
@@ -141,7 +141,9 @@ impl Run<'_> {
             AnalysisType::Conditioning => {
                 conditioning::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
-            other => Err(Error::Input(format!("analysis type {other:?} is not available yet"))),
+            AnalysisType::ImplicitDynamic => {
+                implicit_dynamic::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
         };
         let ending = match outcome {
             Ok(ending) => ending,

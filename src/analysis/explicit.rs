@@ -10,11 +10,11 @@ use crate::deck::model::{AnalysisType, Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
-use crate::parallel::{World, migrate};
+use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::imbalance;
+use super::balance::{self, imbalance};
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
@@ -66,9 +66,7 @@ pub fn run<const D: usize>(
             });
         }
         clock
-            .time(Phase::Migrate, || {
-                migrate(world, &model.partition, &model.grid, points).map(drop)
-            })
+            .time(Phase::Migrate, || balance::settle(world, model, points))
             .map_err(|error| at_step(error, number, span))?;
         steps.accept(span);
         recorder.steps_completed = number;
