@@ -19,8 +19,8 @@ use crate::petsc::log::Stages;
 use crate::petsc::session::{self, Session};
 
 use super::clock::Clock;
-use super::quasi_static;
 use super::recorder::{Ending, Recorder};
+use super::{explicit, quasi_static};
 use super::{plan, setup};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
@@ -134,6 +134,9 @@ impl Run<'_> {
         let outcome = match model.deck.analysis.kind {
             AnalysisType::QuasiStatic => {
                 quasi_static::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::Explicit => {
+                explicit::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
             other => Err(Error::Input(format!("analysis type {other:?} is not available yet"))),
         };

@@ -3,6 +3,10 @@
 //! | deck value or step | file | source |
 //! |---|---|---|
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
+//! | `explicit` | `explicit.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
+//! | points to nodes and back | `mapping.rs` | Ghost eq. 6, 8-10 |
+//! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
+//! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
 //! | map and number: the grid side of a step | `discretise.rs` | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
@@ -21,6 +25,10 @@ pub mod clock;
 pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
+pub mod explicit;
+pub mod grid_mass;
+pub mod ledger;
+pub mod mapping;
 pub mod motion;
 pub mod plan;
 pub mod quasi_static;
@@ -29,5 +37,6 @@ pub mod recorder;
 pub mod setup;
 pub mod solver;
 pub mod stepping;
+pub mod time_step;
 pub mod update;
 pub mod verify;

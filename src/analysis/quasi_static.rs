@@ -4,7 +4,6 @@
 use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::{map_forces, point_forces};
-use crate::assembly::internal::StepPoints;
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -152,13 +151,7 @@ fn solve_step<const D: usize>(
     let external_start = external(span.factor_start, span.time_start)?;
     let external_end = external(span.factor_end, span.time_end)?;
     let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
-    let step = StepPoints {
-        points,
-        materials: &model.materials,
-        influences: &mesh.influences,
-        groups: &mesh.groups,
-        group_nodes: &mesh.group_nodes,
-    };
+    let step = mesh.step_points(points, &model.materials);
     let settings = NewtonSettings {
         tolerance: deck.analysis.tolerance,
         max_evaluations: deck.analysis.max_iterations,
@@ -268,7 +261,7 @@ fn solve_step<const D: usize>(
 }
 
 /// Nodal external force of the owned degrees of freedom. Collective.
-fn owned_forces<const D: usize>(
+pub fn owned_forces<const D: usize>(
     world: &World,
     numbering: &Numbering,
     mesh: &Discretisation<D>,
@@ -281,7 +274,7 @@ fn owned_forces<const D: usize>(
 }
 
 /// Work of loads and moved boundaries over the step, by the trapezoidal rule, this rank's share.
-fn work_of_step<const D: usize>(
+pub fn work_of_step<const D: usize>(
     conditions: &Conditions,
     numbering: &Numbering,
     displacement: &[f64],
@@ -304,9 +297,7 @@ pub fn figures<const D: usize>(
     points: &Points<D>,
     recorder: &Recorder,
 ) -> Result<std::collections::BTreeMap<String, f64>> {
-    let steps = model.deck.analysis.steps.unwrap_or(1);
-    let factor = recorder.steps_completed as f64 / steps as f64;
-    let time = model.deck.analysis.duration.unwrap_or(0.0) * factor;
+    let (factor, time) = recorder.reached;
     verify::figures(world, &model.deck.verify, points, factor, time)
 }
 

@@ -36,6 +36,8 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
+    /// Load factor and time (s) reached so far.
+    pub reached: (f64, f64),
     pub versions: BTreeMap<String, String>,
     populated_cells: usize,
     imbalance: f64,
@@ -79,6 +81,7 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
+            reached: (0.0, 0.0),
             versions,
             populated_cells: 0,
             imbalance: 1.0,
@@ -92,6 +95,7 @@ impl Recorder {
     /// Records one accepted step (or part of one): a row and a line.
     pub fn step(&mut self, world: &World, row: &HistoryRow, with_newton: bool) -> Result<()> {
         self.history.push(row, world.comm())?;
+        self.reached = (row.load_factor, row.time);
         self.populated_cells = row.populated_cells;
         self.imbalance = row.imbalance;
         let newton = with_newton.then_some(NewtonReport {

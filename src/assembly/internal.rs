@@ -23,6 +23,21 @@ pub struct StepPoints<'a, const D: usize> {
     pub group_nodes: &'a [u32],
 }
 
+impl<'a, const D: usize> StepPoints<'a, D> {
+    /// Local nodes of a group of points.
+    #[inline]
+    pub fn nodes_of_group(&self, group: usize) -> &'a [u32] {
+        let offsets = &self.groups.node_offsets;
+        &self.group_nodes[offsets[group]..offsets[group + 1]]
+    }
+
+    /// Local nodes of point `p`, in the order of its influences.
+    #[inline]
+    pub fn nodes_of(&self, p: usize) -> &'a [u32] {
+        self.nodes_of_group(self.groups.group_of_point[p])
+    }
+}
+
 /// Health of an evaluation on this rank.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Health {

@@ -10,7 +10,7 @@ use super::numbering::{Numbering, Touched};
 use super::places::Places;
 
 /// Exact sparsity of one rank's rows, in blocks of one node.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Pattern {
     /// Row r of the owned nodes is `offsets[r]..offsets[r + 1]`; rows beyond `numbering.owned`
     /// belong to ghosts this rank contributes to, in local order.

@@ -21,7 +21,8 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             key("model", Choice(&["hencky", "von-mises"]), Required,
                 "Hencky elasticity, alone or with perfect von Mises plasticity."),
-            key("young", Number, Required, "Young's modulus.").unit("Pa").range(POSITIVE),
+            key("young", Number, Required, "Young's modulus; zero (none) only in explicit runs.")
+                .unit("Pa").range(at_least(0.0)),
             key("poisson", Number, Required, "Poisson's ratio.").range(inside(-1.0, 0.5)),
             key("yield", Number, Optional("needed by von-mises, only there"),
                 "rho_y: radius sqrt(2 J2) of the Kirchhoff stress at yield (Lagrangian eq. 43).")
