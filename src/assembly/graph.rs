@@ -20,6 +20,10 @@ impl Lists {
         self.offsets.push(self.items.len());
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     pub fn len(&self) -> usize {
         self.offsets.len() - 1
     }
