@@ -146,6 +146,7 @@ impl Mul for Jet {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl Div for Jet {
     type Output = Self;
 
