@@ -8,7 +8,6 @@ use crate::assembly::{BlockMatrix, internal, mass};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
 use crate::output::history::{Conditioning, HistoryRow};
-use crate::output::summary::Status;
 use crate::parallel::{World, migrate};
 use crate::petsc::log::Phase;
 use crate::points::Points;
@@ -16,7 +15,7 @@ use crate::points::Points;
 use super::balance::imbalance;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
-use super::equilibrium::{expand_ghost, ghost_matrix};
+use super::equilibrium::{add_scalar, ghost_matrix};
 use super::extremes::{self, Extremes};
 use super::mapping;
 use super::reactions::reactions;
@@ -60,7 +59,7 @@ pub fn run<const D: usize>(
             Ok(())
         })?;
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// The numbers of one position. Collective.
@@ -152,9 +151,7 @@ impl<const D: usize> System<D> {
         stiffness.reduce(world, pattern)?;
         let mut stiffness_ghost = stiffness.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.stiffness)? {
-            let mut expanded = BlockMatrix::<D>::zeros(pattern);
-            expand_ghost(&share, pattern, &mut expanded);
-            add(&mut stiffness_ghost.values, &expanded.values);
+            add_scalar(&share, pattern, &mut stiffness_ghost);
         }
         Ok(System { mass, mass_ghost, lumped, stiffness, stiffness_ghost })
     }

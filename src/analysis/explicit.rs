@@ -9,12 +9,11 @@ use crate::assembly::external::point_forces;
 use crate::deck::model::{AnalysisType, Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
-use crate::output::summary::Status;
-use crate::parallel::{World, migrate};
+use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::imbalance;
+use super::balance::{self, imbalance};
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
@@ -54,21 +53,16 @@ pub fn run<const D: usize>(
         let booked = ledger.book(&entry, &mut row);
         if let Err(why) = booked {
             let (limit, _) = limit_now(model, points);
-            return Ok(Ending {
-                status: Status::Failed,
-                reason: format!(
-                    "step {number} (t = {:.6e} s): {why}; the time step {:.3e} s is too large \
+            return Ok(Ending::failed(format!(
+                "step {number} (t = {:.6e} s): {why}; the time step {:.3e} s is too large \
                      (stability limit of full cells {limit:.3e} s){}",
-                    span.time_end,
-                    row.dt,
-                    unstabilised(model)
-                ),
-            });
+                span.time_end,
+                row.dt,
+                unstabilised(model)
+            )));
         }
         clock
-            .time(Phase::Migrate, || {
-                migrate(world, &model.partition, &model.grid, points).map(drop)
-            })
+            .time(Phase::Migrate, || balance::settle(world, model, points))
             .map_err(|error| at_step(error, number, span))?;
         steps.accept(span);
         recorder.steps_completed = number;
@@ -87,7 +81,7 @@ pub fn run<const D: usize>(
             Ok(())
         })?;
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// What makes a consistent mass without Ghost share unstable is not the time step.

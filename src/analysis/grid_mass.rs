@@ -86,6 +86,25 @@ impl GridMass {
         }
     }
 
+    /// factor M as a matrix in its owners' rows.
+    pub fn scaled<const D: usize>(&self, mesh: &Discretisation<D>, factor: f64) -> BlockMatrix<1> {
+        let pattern = &mesh.pattern;
+        match self {
+            GridMass::Consistent { matrix, .. } => {
+                BlockMatrix { values: matrix.values.iter().map(|value| factor * value).collect() }
+            }
+            GridMass::Lumped(mass) => {
+                let mut matrix = BlockMatrix::zeros(pattern);
+                for row in 0..mesh.numbering.owned {
+                    if let Some(entry) = pattern.find(&mesh.numbering, row, row) {
+                        matrix.values[entry] = factor * mass[row];
+                    }
+                }
+                matrix
+            }
+        }
+    }
+
     /// Kinetic energy in the Ghost share, v M_G v / 2, of this rank, J.
     pub fn ghost_energy<const D: usize>(&self, mesh: &Discretisation<D>, velocity: &[f64]) -> f64 {
         match self {

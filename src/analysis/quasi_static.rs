@@ -7,6 +7,7 @@ use crate::assembly::external::{map_forces, point_forces};
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
 use crate::parallel::World;
@@ -14,13 +15,14 @@ use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance::{self, imbalance};
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
-use super::equilibrium::{Equilibrium, NewtonSettings};
+use super::equilibrium::Equilibrium;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
-use super::{motion, solver, update, verify};
+use super::{motion, newton, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -35,7 +37,19 @@ pub fn run<const D: usize>(
     let steps = analysis.steps.unwrap_or(1);
     let mut stepping = Stepping::new(steps, 0.0, analysis.on_failure, analysis.smallest_step);
     let mut totals = Totals::default();
-    recorder.frame(world, 0, 0.0, points)?;
+    match recorder.resumed() {
+        Some(state) => {
+            stepping.restore(state)?;
+            totals.restore(state)?;
+        }
+        None => recorder.frame(world, 0, 0.0, points)?,
+    }
+    let state_of = |stepping: &Stepping, totals: &Totals| {
+        let mut state = RunState::new();
+        stepping.save(&mut state);
+        totals.save(&mut state);
+        state
+    };
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
         match solve_step(world, model, points, recorder, clock, span, number)? {
@@ -74,22 +88,34 @@ pub fn run<const D: usize>(
                     model.grid = grid;
                 }
                 clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+                let moment = match (stepping.next_span(), ended) {
+                    (None, _) => Moment::End,
+                    (_, true) => Moment::Step,
+                    (_, false) => Moment::PartOfStep,
+                };
+                let state = state_of(&stepping, &totals);
+                let stop = clock.time(Phase::Output, || {
+                    recorder.end_step(world, model, points, moment, state)
+                })?;
+                if let Some(ending) = stop {
+                    return Ok(ending);
+                }
             }
             Err(why) => {
                 recorder.log.say(&format!("step {number} refused: {why}"));
                 if !stepping.refuse() {
-                    let status = Status::Stopped;
-                    let reason = format!(
+                    let state = state_of(&stepping, &totals);
+                    recorder.keep_last_state(world, model, points, state)?;
+                    return Ok(Ending::stopped(format!(
                         "step {number} of {steps} could not be solved: {why}; the last finished \
                          step is {}",
                         stepping.completed()
-                    );
-                    return Ok(Ending { status, reason });
+                    )));
                 }
             }
         }
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// Sums over the run so far.
@@ -97,6 +123,19 @@ pub fn run<const D: usize>(
 struct Totals {
     work: f64,
     ghost: f64,
+}
+
+impl Totals {
+    fn save(&self, state: &mut RunState) {
+        state.set("totals.work", self.work);
+        state.set("totals.ghost", self.ghost);
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.work = state.number("totals.work")?;
+        self.ghost = state.number("totals.ghost")?;
+        Ok(())
+    }
 }
 
 /// A finished step: its row, and the grid as it was solved.
@@ -152,49 +191,21 @@ fn solve_step<const D: usize>(
     let external_end = external(span.factor_end, span.time_end)?;
     let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
     let step = mesh.step_points(points, &model.materials);
-    let settings = NewtonSettings {
-        tolerance: deck.analysis.tolerance,
-        max_evaluations: deck.analysis.max_iterations,
-        frame: deck.method.frame,
-        inverted: deck.analysis.inverted_iterates,
-    };
-    let mut problem = Equilibrium::new(
+    let problem = Equilibrium::new(
         world,
         &mesh,
         step,
         &conditions,
         &left_out,
         external_end.clone(),
-        settings,
+        newton::settings(model),
     )?;
-    let mut snes = solver::newton::<D>(world, numbering.total * D, settings.max_evaluations)?;
-    let mut matrix = clock.time(Phase::Assemble, || {
-        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
-        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
-    })?;
-    let mut solution = matrix.vector()?;
-    let before = clock.elapsed();
-    let outcome = snes.solve(&mut problem, &mut matrix, &mut solution)?;
-    let assembled = problem.assembly_seconds;
-    clock.add(Phase::Assemble, assembled);
-    clock.add(Phase::Solve, clock.elapsed() - before - assembled);
-
-    recorder.iterations(world, number, &problem.errors)?;
-    if !outcome.converged {
-        let point = problem.refused_point(points);
-        let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
-        return Ok(Err(format!("Newton's method failed ({}){detail}", outcome.reason)));
-    }
-    recorder.newton.add(problem.errors.len());
-    recorder.linear.add(outcome.linear_iterations_total);
-
-    let displacement = problem.displacement().to_vec();
-    let internal = problem.internal_force().to_vec();
-    let internal_start = problem.internal_force_at_start().to_vec();
-    let energy_ghost = world.sum(problem.ghost_energy());
-    let residual = problem.errors.last().copied().unwrap_or(0.0);
-    let evaluations = problem.errors.len();
-    drop(problem);
+    let solved = newton::solve(world, model, &mesh, points, problem, recorder, clock, number)?;
+    let solved = match solved {
+        Ok(solved) => solved,
+        Err(why) => return Ok(Err(why)),
+    };
+    let (displacement, internal) = (solved.displacement, solved.internal);
 
     let made = update::increments(step, &displacement);
     let moved_grid = match motion::moved(world, deck, &model.grid, numbering, &displacement, span)?
@@ -211,7 +222,7 @@ fn solve_step<const D: usize>(
         numbering,
         &displacement,
         [&external_start, &external_end],
-        [&internal_start, &internal],
+        [&solved.internal_start, &internal],
     );
     clock.time(Phase::Update, || {
         let updated = update::apply(
@@ -236,12 +247,12 @@ fn solve_step<const D: usize>(
         load_factor: span.factor_end,
         time: span.time_end,
         dt: span.time_end - span.time_start,
-        newton_iterations: evaluations,
-        residual,
-        linear_iterations: outcome.linear_iterations_total,
+        newton_iterations: solved.evaluations,
+        residual: solved.residual,
+        linear_iterations: solved.linear_iterations,
         energy_strain: sums[0],
         energy_plastic: sums[1],
-        energy_ghost,
+        energy_ghost: solved.ghost_energy,
         work_external: sums[2],
         reactions: reactions(
             world,

@@ -10,9 +10,9 @@
 //! | `internal.rs` | internal force and tangent stiffness of the points (Lagrangian eq. 27, 28) |
 //! | `places.rs` | where each dense block lies in the rows |
 //! | `kernel.rs` | the same sums, tiled for vector registers |
+//! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
 //! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
-//! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |

@@ -45,7 +45,7 @@ pub const SECTIONS: &[Section] = &[
                 "Points on a lattice of their own."),
             key("gauss", Count, Optional("none"),
                 "Gauss points per axis and cell: updated-Lagrangian finite elements, with basis = \"mpm\" and motion = { follow = \"material\" }.")
-                .range(between(1.0, 4.0)),
+                .range(between(1.0, 8.0)),
             key("velocity", Expressions("X Y Z"), Optional("zeros"), "Initial velocity.")
                 .unit("m/s"),
         ],
