@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod run;
+pub mod validation;
 
 use std::ffi::OsStr;
 use std::process::{Command, Output, Stdio};
