@@ -50,7 +50,8 @@ impl Linear {
         if one { Linear::DirectOnOne } else { Linear::Direct }
     }
 
-    fn options(self, ranks: usize) -> Vec<(&'static str, String)> {
+    /// Options without the prefix, on `ranks` ranks.
+    pub fn options(self, ranks: usize) -> Vec<(&'static str, String)> {
         const PACKAGE: &str = "mumps";
         let list: &[(&str, &str)] = match self {
             Linear::DirectOnOne if ranks > 1 => &[
