@@ -2,8 +2,8 @@
 //! not whole, or of another problem, is never taken.
 
 mod common;
-#[path = "common/run.rs"]
-mod run;
+#[path = "common/program.rs"]
+mod program;
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use common::mpirun;
 use mpm_par::output::seal::Checksum;
-use run::*;
+use program::*;
 
 const RANKS: [usize; 4] = [1, 2, 3, 4];
 

@@ -1,5 +1,6 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
+use crate::assembly::internal::StepPoints;
 use crate::assembly::manufactured::Manufactured;
 use crate::assembly::numbering::Touched;
 use crate::assembly::{Numbering, Pattern, Populated, pattern};
@@ -49,15 +50,37 @@ pub struct Discretisation<const D: usize> {
     pub ghost_cells: Vec<usize>,
 }
 
+/// Whether the step's equations couple nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coupling {
+    /// Faces and sparsity are found.
+    Matrix,
+    /// A diagonal system: neither faces nor sparsity (both stay empty).
+    Diagonal,
+}
+
 impl<const D: usize> Discretisation<D> {
     /// Maps the points onto the grid and numbers the equations. Collective.
     pub fn new(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Self> {
+        Self::with_coupling(world, model, points, Coupling::Matrix)
+    }
+
+    /// As [`Self::new`]. Collective.
+    pub fn with_coupling(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        coupling: Coupling,
+    ) -> Result<Self> {
         let (grid, partition) = (&model.grid, &model.partition);
         let basis = model.deck.method.basis;
         let influences = world.fail_together(basis::map_points(grid, basis, points))?;
         let groups = Groups::new(&influences);
         let populated = Populated::find(world, grid, partition, basis, points)?;
-        let (faces, ghost_cells) = find_faces(world, model, &populated)?;
+        let (faces, ghost_cells) = match coupling {
+            Coupling::Matrix => find_faces(world, model, &populated)?,
+            Coupling::Diagonal => Default::default(),
+        };
 
         let mut reached = groups.nodes.clone();
         reached.extend(faces.iter().flat_map(|face| face.nodes.iter().copied()));
@@ -70,21 +93,34 @@ impl<const D: usize> Discretisation<D> {
             .map(|g| groups.nodes(g))
             .chain(faces.iter().map(|face| face.nodes.as_slice()));
         let owner_of = |node| partition.owner_of_node(grid, node);
-        let (numbering, pattern) = pattern::build(world, touched, owner_of, supports)?;
+        let (numbering, pattern) = match coupling {
+            Coupling::Matrix => pattern::build(world, touched, owner_of, supports)?,
+            Coupling::Diagonal => {
+                (Numbering::build(world, touched.owned, &touched.foreign)?, Pattern::default())
+            }
+        };
 
-        let group_nodes = groups.nodes.iter().map(|node| numbering.index[node]).collect();
+        let locals = |nodes: &[usize]| -> Vec<u32> {
+            nodes.iter().filter_map(|&node| numbering.local(node).map(|i| i as u32)).collect()
+        };
+        let group_nodes = locals(&groups.nodes);
         let mut node_weight = vec![0.0; numbering.len()];
         let mut node_grip = vec![0.0; numbering.len()];
         let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
-        for (entry, node) in influences.nodes.iter().enumerate() {
-            let local = numbering.index[node] as usize;
-            let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
-            node_weight[local] += influences.weights[entry];
-            node_grip[local] += influences.weights[entry].abs() + reach * slope;
+        for (p, &group) in groups.group_of_point.iter().enumerate() {
+            let nodes = &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
+            for (&node, entry) in nodes.iter().zip(influences.row(p)) {
+                let weight = influences.weights[entry];
+                let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
+                node_weight[node as usize] += weight;
+                node_grip[node as usize] += weight.abs() + reach * slope;
+            }
         }
         let mut on_face = vec![0.0; numbering.len()];
-        for node in faces.iter().flat_map(|face| &face.nodes) {
-            on_face[numbering.index[node] as usize] = 1.0;
+        for face in &faces {
+            for node in locals(&face.nodes) {
+                on_face[node as usize] = 1.0;
+            }
         }
         for field in [&mut node_weight, &mut node_grip, &mut on_face] {
             numbering.halo.reverse_add(world, field, 1)?;
@@ -103,6 +139,21 @@ impl<const D: usize> Discretisation<D> {
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
         })
+    }
+
+    /// The points as the equations see them.
+    pub fn step_points<'a>(
+        &'a self,
+        points: &'a Points<D>,
+        materials: &'a [Material],
+    ) -> StepPoints<'a, D> {
+        StepPoints {
+            points,
+            materials,
+            influences: &self.influences,
+            groups: &self.groups,
+            group_nodes: &self.group_nodes,
+        }
     }
 
     /// Local nodes that carry no equation of their own: their grip on the material is at most

@@ -20,8 +20,8 @@ use crate::petsc::session::{self, Session};
 
 use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
-use super::quasi_static;
 use super::recorder::{Ending, Recorder, Resume};
+use super::{conditioning, explicit, implicit_dynamic, quasi_static};
 use super::{plan, setup};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
@@ -165,7 +165,15 @@ impl Run<'_> {
             AnalysisType::QuasiStatic => {
                 quasi_static::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
-            other => Err(Error::Input(format!("analysis type {other:?} is not available yet"))),
+            AnalysisType::Explicit => {
+                explicit::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::Conditioning => {
+                conditioning::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::ImplicitDynamic => {
+                implicit_dynamic::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
         };
         let (ending, kind): (_, fn(String) -> Error) = match outcome {
             Ok(ending) => (ending, Error::Run),

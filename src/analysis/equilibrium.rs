@@ -42,6 +42,7 @@ pub struct Equilibrium<'a, const D: usize> {
     external_owned: Vec<f64>,
     /// K_G: constant over the step.
     ghost: Option<BlockMatrix<1>>,
+    inertia: Option<Inertia>,
     stiffness: BlockMatrix<D>,
     /// Tangent rows of held degrees of freedom at the previous iterate.
     held_rows: HeldRows,
@@ -58,6 +59,16 @@ pub struct Equilibrium<'a, const D: usize> {
     pub health: Health,
     /// Wall time of all evaluations, s.
     pub assembly_seconds: f64,
+}
+
+/// Inertia that moves with the increments u: the equations become
+/// share (f_int(u) + K_G u) + matrix u = f_ext.
+#[derive(Debug)]
+pub struct Inertia {
+    /// 1 + alpha of the HHT method, 1 for Newmark's.
+    pub share: f64,
+    /// M~ / (beta dt^2) in its owners' rows, kg/s2.
+    pub matrix: BlockMatrix<1>,
 }
 
 #[derive(Default)]
@@ -99,6 +110,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             increment,
             external_owned,
             ghost,
+            inertia: None,
             stiffness: BlockMatrix::zeros(pattern),
             held_rows,
             displacement: vec![0.0; numbering.len() * D],
@@ -112,6 +124,12 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             errors: Vec::new(),
             health: Health::default(),
         })
+    }
+
+    /// The same equations of a body that has mass.
+    pub fn with_inertia(mut self, inertia: Inertia) -> Self {
+        self.inertia = Some(inertia);
+        self
     }
 
     /// Nodal increments of the last evaluation, local nodes.
@@ -160,7 +178,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     fn evaluate(&mut self) -> Result<bool> {
         self.stiffness.values.fill(0.0);
         if let Some(ghost) = &self.ghost {
-            expand_ghost(ghost, self.pattern, &mut self.stiffness);
+            add_scalar(ghost, self.pattern, &mut self.stiffness);
         }
         let mut force = vec![0.0; self.numbering.len() * D];
         self.health = internal::assemble(
@@ -184,6 +202,13 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             add_product::<D>(ghost, self.pattern, &self.displacement, &mut force);
         }
         self.stiffness.reduce(self.world, self.pattern)?;
+        if let Some(inertia) = &self.inertia {
+            for value in force.iter_mut().chain(&mut self.stiffness.values) {
+                *value *= inertia.share;
+            }
+            add_product::<D>(&inertia.matrix, self.pattern, &self.displacement, &mut force);
+            add_scalar(&inertia.matrix, self.pattern, &mut self.stiffness);
+        }
         self.internal_owned = force;
         Ok(true)
     }
@@ -384,7 +409,7 @@ pub fn ghost_matrix<const D: usize>(
     }
     let mut matrix = BlockMatrix::zeros(&mesh.pattern);
     for face in &mesh.faces {
-        let nodes: Vec<u32> = face.nodes.iter().map(|node| mesh.numbering.index[node]).collect();
+        let nodes: Vec<u32> = face.nodes.iter().map(|&node| mesh.numbering.index[node]).collect();
         let factor = weight(face);
         let block: Vec<f64> = face.matrix.iter().map(|value| factor * value).collect();
         matrix.add(&mesh.numbering, &mesh.pattern, &nodes, &block);
@@ -393,9 +418,9 @@ pub fn ghost_matrix<const D: usize>(
     Ok(Some(matrix))
 }
 
-/// Writes J ⊗ 1 into the owned rows.
-fn expand_ghost<const D: usize>(
-    ghost: &BlockMatrix<1>,
+/// Adds J ⊗ 1 to the owned rows.
+pub fn add_scalar<const D: usize>(
+    scalar: &BlockMatrix<1>,
     pattern: &Pattern,
     matrix: &mut BlockMatrix<D>,
 ) {
@@ -407,7 +432,7 @@ fn expand_ghost<const D: usize>(
         for i in 0..D {
             let start = D * D * range.start + i * width * D;
             for position in 0..width {
-                matrix.values[start + position * D + i] = ghost.values[range.start + position];
+                matrix.values[start + position * D + i] += scalar.values[range.start + position];
             }
         }
     }

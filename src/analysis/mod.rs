@@ -3,9 +3,16 @@
 //! | deck value or step | file | source |
 //! |---|---|---|
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
+//! | `explicit` | `explicit.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
+//! | `implicit-dynamic` | `implicit_dynamic.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
+//! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
+//! | points to nodes and back | `mapping.rs` | Ghost eq. 6, 8-10 |
+//! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
+//! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
 //! | map and number: the grid side of a step | `discretise.rs` | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
+//! | Newton's method for a step | `newton.rs` | |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
 //! | the mesh between steps | `motion.rs` | Rotation §2 (viii) |
@@ -20,10 +27,18 @@
 pub mod balance;
 pub mod checkpointing;
 pub mod clock;
+pub mod conditioning;
 pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
+pub mod explicit;
+pub mod extremes;
+pub mod grid_mass;
+pub mod implicit_dynamic;
+pub mod ledger;
+pub mod mapping;
 pub mod motion;
+pub mod newton;
 pub mod plan;
 pub mod quasi_static;
 pub mod reactions;
@@ -31,5 +46,6 @@ pub mod recorder;
 pub mod setup;
 pub mod solver;
 pub mod stepping;
+pub mod time_step;
 pub mod update;
 pub mod verify;

@@ -4,7 +4,6 @@
 use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::{map_forces, point_forces};
-use crate::assembly::internal::StepPoints;
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -19,11 +18,11 @@ use super::balance::{self, imbalance};
 use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
-use super::equilibrium::{Equilibrium, NewtonSettings};
+use super::equilibrium::Equilibrium;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
-use super::{motion, solver, update, verify};
+use super::{motion, newton, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -191,56 +190,22 @@ fn solve_step<const D: usize>(
     let external_start = external(span.factor_start, span.time_start)?;
     let external_end = external(span.factor_end, span.time_end)?;
     let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
-    let step = StepPoints {
-        points,
-        materials: &model.materials,
-        influences: &mesh.influences,
-        groups: &mesh.groups,
-        group_nodes: &mesh.group_nodes,
-    };
-    let settings = NewtonSettings {
-        tolerance: deck.analysis.tolerance,
-        max_evaluations: deck.analysis.max_iterations,
-        frame: deck.method.frame,
-        inverted: deck.analysis.inverted_iterates,
-    };
-    let mut problem = Equilibrium::new(
+    let step = mesh.step_points(points, &model.materials);
+    let problem = Equilibrium::new(
         world,
         &mesh,
         step,
         &conditions,
         &left_out,
         external_end.clone(),
-        settings,
+        newton::settings(model),
     )?;
-    let mut snes = solver::newton::<D>(world, numbering.total * D, settings.max_evaluations)?;
-    let mut matrix = clock.time(Phase::Assemble, || {
-        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
-        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
-    })?;
-    let mut solution = matrix.vector()?;
-    let before = clock.elapsed();
-    let outcome = snes.solve(&mut problem, &mut matrix, &mut solution)?;
-    let assembled = problem.assembly_seconds;
-    clock.add(Phase::Assemble, assembled);
-    clock.add(Phase::Solve, clock.elapsed() - before - assembled);
-
-    recorder.iterations(world, number, &problem.errors)?;
-    if !outcome.converged {
-        let point = problem.refused_point(points);
-        let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
-        return Ok(Err(format!("Newton's method failed ({}){detail}", outcome.reason)));
-    }
-    recorder.newton.add(problem.errors.len());
-    recorder.linear.add(outcome.linear_iterations_total);
-
-    let displacement = problem.displacement().to_vec();
-    let internal = problem.internal_force().to_vec();
-    let internal_start = problem.internal_force_at_start().to_vec();
-    let energy_ghost = world.sum(problem.ghost_energy());
-    let residual = problem.errors.last().copied().unwrap_or(0.0);
-    let evaluations = problem.errors.len();
-    drop(problem);
+    let solved = newton::solve(world, model, &mesh, points, problem, recorder, clock, number)?;
+    let solved = match solved {
+        Ok(solved) => solved,
+        Err(why) => return Ok(Err(why)),
+    };
+    let (displacement, internal) = (solved.displacement, solved.internal);
 
     let made = update::increments(step, &displacement);
     let moved_grid = match motion::moved(world, deck, &model.grid, numbering, &displacement, span)?
@@ -257,7 +222,7 @@ fn solve_step<const D: usize>(
         numbering,
         &displacement,
         [&external_start, &external_end],
-        [&internal_start, &internal],
+        [&solved.internal_start, &internal],
     );
     clock.time(Phase::Update, || {
         let updated = update::apply(
@@ -282,12 +247,12 @@ fn solve_step<const D: usize>(
         load_factor: span.factor_end,
         time: span.time_end,
         dt: span.time_end - span.time_start,
-        newton_iterations: evaluations,
-        residual,
-        linear_iterations: outcome.linear_iterations_total,
+        newton_iterations: solved.evaluations,
+        residual: solved.residual,
+        linear_iterations: solved.linear_iterations,
         energy_strain: sums[0],
         energy_plastic: sums[1],
-        energy_ghost,
+        energy_ghost: solved.ghost_energy,
         work_external: sums[2],
         reactions: reactions(
             world,
@@ -307,7 +272,7 @@ fn solve_step<const D: usize>(
 }
 
 /// Nodal external force of the owned degrees of freedom. Collective.
-fn owned_forces<const D: usize>(
+pub fn owned_forces<const D: usize>(
     world: &World,
     numbering: &Numbering,
     mesh: &Discretisation<D>,
@@ -320,7 +285,7 @@ fn owned_forces<const D: usize>(
 }
 
 /// Work of loads and moved boundaries over the step, by the trapezoidal rule, this rank's share.
-fn work_of_step<const D: usize>(
+pub fn work_of_step<const D: usize>(
     conditions: &Conditions,
     numbering: &Numbering,
     displacement: &[f64],
@@ -343,9 +308,7 @@ pub fn figures<const D: usize>(
     points: &Points<D>,
     recorder: &Recorder,
 ) -> Result<std::collections::BTreeMap<String, f64>> {
-    let steps = model.deck.analysis.steps.unwrap_or(1);
-    let factor = recorder.steps_completed as f64 / steps as f64;
-    let time = model.deck.analysis.duration.unwrap_or(0.0) * factor;
+    let (factor, time) = recorder.reached;
     verify::figures(world, &model.deck.verify, points, factor, time)
 }
 

@@ -38,6 +38,8 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
+    /// Load factor and time (s) reached so far.
+    pub reached: (f64, f64),
     pub versions: BTreeMap<String, String>,
     populated_cells: usize,
     imbalance: f64,
@@ -132,6 +134,7 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
+            reached: (0.0, 0.0),
             versions,
             populated_cells: 0,
             imbalance: 1.0,
@@ -252,6 +255,7 @@ impl Recorder {
         self.seconds = self.earlier_seconds + row.wall_seconds;
         let whole_run = HistoryRow { wall_seconds: self.seconds, ..row.clone() };
         self.history.push(&whole_run, world.comm())?;
+        self.reached = (row.load_factor, row.time);
         self.populated_cells = row.populated_cells;
         self.imbalance = row.imbalance;
         let newton = with_newton.then_some(NewtonReport {

@@ -40,10 +40,8 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
         displacement: Vec::with_capacity(count),
     };
     for p in 0..count {
-        let row = step.influences.offsets[p]..step.influences.offsets[p + 1];
-        let group = step.groups.group_of_point[p];
-        let nodes =
-            &step.group_nodes[step.groups.node_offsets[group]..step.groups.node_offsets[group + 1]];
+        let row = step.influences.row(p);
+        let nodes = step.nodes_of(p);
         let nodal = |a: usize| -> [f64; D] {
             let start = nodes[a] as usize * D;
             std::array::from_fn(|i| displacement[start + i])
@@ -89,7 +87,7 @@ pub fn reason_to_refuse<const D: usize>(
     world.first_message(reason)
 }
 
-/// Applies the increments: F, b_e, stress, history, domains, positions; returns the energies.
+/// Applies the increments: F, b_e, stress, history, domains, positions.
 #[allow(clippy::too_many_arguments)]
 pub fn apply<const D: usize>(
     grid: &Grid<D>,
@@ -101,9 +99,21 @@ pub fn apply<const D: usize>(
     increments: &Increments<D>,
     points: &mut Points<D>,
 ) -> Result<()> {
-    let mut whole = Vec::with_capacity(points.len());
-    for p in 0..points.len() {
-        let increment = &increments.deformation[p];
+    deform(materials, &increments.deformation, points);
+    follow(grid, basis, rule, numbering, displacement, &increments.deformation, points)?;
+    move_points(&increments.displacement, points);
+    Ok(())
+}
+
+/// F, b_e, stress and history for the increments dF (Lagrangian eq. 16); returns the energies
+/// of the new state, all but the kinetic one.
+pub fn deform<const D: usize>(
+    materials: &[Material],
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+) -> PointEnergies {
+    let mut sum = PointEnergies::default();
+    for (p, increment) in increments.iter().enumerate() {
         let start = StepStart {
             material: &materials[points.body[p] as usize],
             deformation_gradient: &points.deformation_gradient[p],
@@ -111,29 +121,47 @@ pub fn apply<const D: usize>(
             volume_initial: points.volume_initial[p],
         };
         let state = mechanics::stress(&start, increment);
-        let mut step = Matrix3::identity();
-        for i in 0..D {
-            for j in 0..D {
-                step[(i, j)] = increment[i][j];
-            }
-        }
-        points.deformation_gradient[p] = step * points.deformation_gradient[p];
+        points.deformation_gradient[p] = embed(increment) * points.deformation_gradient[p];
         points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
         points.kirchhoff_stress[p] = state.kirchhoff_stress;
         points.plastic_strain[p] += state.plastic_increment;
         points.dissipation[p] += state.dissipation;
-        whole.push(step);
+        sum.strain += state.stored_energy * points.volume_initial[p];
+        sum.plastic += points.dissipation[p] * points.volume_initial[p];
     }
+    sum
+}
+
+/// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
+/// those of the step's start. `displacement` is the one that made the increments.
+pub fn follow<const D: usize>(
+    grid: &Grid<D>,
+    basis: Basis,
+    rule: DomainUpdate,
+    numbering: &Numbering,
+    displacement: &[f64],
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+) -> Result<()> {
+    let whole: Vec<Matrix3<f64>> = increments.iter().map(embed).collect();
     update_domains(grid, basis, rule, points, &whole, &|node| match numbering.local(node) {
         Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
         None => [0.0; D],
-    })?;
-    for (x, moved) in points.position.iter_mut().zip(&increments.displacement) {
+    })
+}
+
+/// Lagrangian eq. 31, Ghost eq. 9, 14.
+pub fn move_points<const D: usize>(displacement: &[[f64; D]], points: &mut Points<D>) {
+    for (x, moved) in points.position.iter_mut().zip(displacement) {
         for (x, m) in x.iter_mut().zip(moved) {
             *x += m;
         }
     }
-    Ok(())
+}
+
+/// dF of plane strain has dF_zz = 1.
+fn embed<const D: usize>(increment: &[[f64; D]; D]) -> Matrix3<f64> {
+    tensor::dense::embed(increment, 1.0)
 }
 
 /// Energies of this rank's points at their present state.

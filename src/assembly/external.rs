@@ -85,7 +85,7 @@ pub fn map_forces<const D: usize>(
             continue;
         }
         for entry in influences.offsets[p]..influences.offsets[p + 1] {
-            let local = numbering.index[&influences.nodes[entry]] as usize;
+            let local = numbering.index[influences.nodes[entry]] as usize;
             for (axis, f) in force.iter().enumerate() {
                 nodal[local * D + axis] += influences.weights[entry] * f;
             }

@@ -5,9 +5,10 @@ use crate::basis::{Groups, Influences};
 use crate::deck::model::Frame;
 use crate::error::Result;
 use crate::material::Material;
-use crate::mechanics::{self, StepStart};
+use crate::mechanics::{self, Contribution, StepStart};
 use crate::points::Points;
 
+use super::kernel::{Batch, multiply_add};
 use super::{BlockMatrix, Numbering, Pattern};
 
 /// What a step's points look like to the equations: fixed while the step is solved.
@@ -20,6 +21,21 @@ pub struct StepPoints<'a, const D: usize> {
     pub groups: &'a Groups,
     /// Local node index of each entry of `groups.nodes`.
     pub group_nodes: &'a [u32],
+}
+
+impl<'a, const D: usize> StepPoints<'a, D> {
+    /// Local nodes of a group of points.
+    #[inline]
+    pub fn nodes_of_group(&self, group: usize) -> &'a [u32] {
+        let offsets = &self.groups.node_offsets;
+        &self.group_nodes[offsets[group]..offsets[group + 1]]
+    }
+
+    /// Local nodes of point `p`, in the order of its influences.
+    #[inline]
+    pub fn nodes_of(&self, p: usize) -> &'a [u32] {
+        self.nodes_of_group(self.groups.group_of_point[p])
+    }
 }
 
 /// Health of an evaluation on this rank.
@@ -39,6 +55,9 @@ impl Health {
 
 /// Internal force at the local nodes (ghost shares included, not yet sent) and, if `stiffness`
 /// is given, the tangent added into it, for the nodal increments `displacement` (local).
+///
+/// `step.groups` are the first supports of `pattern`, in its order. Sums are rounded as the
+/// processor's instruction set allows, in the same order on every call.
 pub fn assemble<const D: usize>(
     step: StepPoints<'_, D>,
     frame: Frame,
@@ -46,66 +65,169 @@ pub fn assemble<const D: usize>(
     pattern: &Pattern,
     displacement: &[f64],
     force: &mut [f64],
-    mut stiffness: Option<&mut BlockMatrix<D>>,
+    stiffness: Option<&mut BlockMatrix<D>>,
 ) -> Result<Health> {
-    let mut health = Health::default();
-    let mut work = Workspace::default();
-    for group in 0..step.groups.len() {
-        let range = step.groups.node_offsets[group]..step.groups.node_offsets[group + 1];
-        let nodes = &step.group_nodes[range];
-        work.reset(nodes.len(), D, stiffness.is_some());
-        work.gather::<D>(nodes, displacement);
-        for &p in step.groups.points(group) {
-            add_point(step, frame, p, &mut work, &mut health, stiffness.is_some());
-        }
-        for (a, &node) in nodes.iter().enumerate() {
-            for i in 0..D {
-                force[node as usize * D + i] += work.force[a * D + i];
+    debug_assert!(numbering.len() * D <= force.len());
+    let task = Task { step, frame, pattern, displacement };
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has just said that it knows the instructions.
+        return Ok(unsafe { assemble_avx2(&task, force, stiffness) });
+    }
+    Ok(task.assemble::<false>(force, stiffness))
+}
+
+/// [`Task::assemble`] compiled for AVX2 with fused multiply-add.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn assemble_avx2<const D: usize>(
+    task: &Task<'_, D>,
+    force: &mut [f64],
+    stiffness: Option<&mut BlockMatrix<D>>,
+) -> Health {
+    task.assemble::<true>(force, stiffness)
+}
+
+/// What an evaluation reads.
+struct Task<'a, const D: usize> {
+    step: StepPoints<'a, D>,
+    frame: Frame,
+    pattern: &'a Pattern,
+    displacement: &'a [f64],
+}
+
+/// One group's arrays, reused from group to group.
+struct Workspace<const D: usize> {
+    displacement: Vec<[f64; D]>,
+    force: Vec<[f64; D]>,
+    gradients: Vec<[f64; D]>,
+    batch: Batch,
+}
+
+impl<const D: usize> Task<'_, D> {
+    /// Inlined into each form so that it is compiled for that form's instructions.
+    #[inline(always)]
+    fn assemble<const FUSED: bool>(
+        &self,
+        force: &mut [f64],
+        mut stiffness: Option<&mut BlockMatrix<D>>,
+    ) -> Health {
+        let mut health = Health::default();
+        let mut work = Workspace {
+            displacement: Vec::new(),
+            force: Vec::new(),
+            gradients: Vec::new(),
+            batch: Batch::default(),
+        };
+        let groups = self.step.groups;
+        for group in 0..groups.len() {
+            let range = groups.node_offsets[group]..groups.node_offsets[group + 1];
+            let nodes = &self.step.group_nodes[range];
+            work.displacement.clear();
+            work.displacement.extend(nodes.iter().map(|&node| {
+                let start = node as usize * D;
+                std::array::from_fn(|i| self.displacement[start + i])
+            }));
+            work.force.clear();
+            work.force.resize(nodes.len(), [0.0; D]);
+            work.batch.start::<D>(nodes.len());
+            for &p in groups.points(group) {
+                self.add_point::<FUSED>(p, &mut work, &mut health, stiffness.is_some());
+                if work.batch.is_full() {
+                    self.flush::<FUSED>(group, nodes, &mut work.batch, stiffness.as_deref_mut());
+                }
+            }
+            self.flush::<FUSED>(group, nodes, &mut work.batch, stiffness.as_deref_mut());
+            for (&node, sum) in nodes.iter().zip(&work.force) {
+                for i in 0..D {
+                    force[node as usize * D + i] += sum[i];
+                }
             }
         }
-        if let Some(matrix) = stiffness.as_deref_mut() {
-            matrix.add(numbering, pattern, nodes, &work.block);
-        }
+        health
     }
-    Ok(health)
-}
 
-/// Dense arrays of one group, reused from group to group.
-#[derive(Default)]
-struct Workspace {
-    /// (node, component)
-    displacement: Vec<f64>,
-    force: Vec<f64>,
-    /// (a, i, b, k), see [`BlockMatrix::add`].
-    block: Vec<f64>,
-    /// Gradients in the frame times one, (node, axis).
-    gradient: Vec<f64>,
-    /// t_ij(b, k) = A_ijkl g_bl V, one row per (i, j).
-    flux: Vec<f64>,
-}
+    #[inline(always)]
+    fn flush<const FUSED: bool>(
+        &self,
+        group: usize,
+        nodes: &[u32],
+        batch: &mut Batch,
+        stiffness: Option<&mut BlockMatrix<D>>,
+    ) {
+        let Some(matrix) = stiffness else { return };
+        if batch.is_empty() {
+            return;
+        }
+        let pattern = self.pattern;
+        let rows = |a: usize| {
+            let row = pattern.row_of[nodes[a] as usize] as usize;
+            let (start, end) = (pattern.offsets[row], pattern.offsets[row + 1]);
+            (D * D * start, D * (end - start))
+        };
+        batch.flush::<D, FUSED>(pattern.places.of(group), rows, &mut matrix.values);
+    }
 
-impl Workspace {
-    fn reset(&mut self, nodes: usize, dimension: usize, with_block: bool) {
-        let size = nodes * dimension;
-        self.displacement.clear();
-        self.force.clear();
-        self.force.resize(size, 0.0);
-        self.gradient.clear();
-        self.gradient.resize(size, 0.0);
+    #[inline(always)]
+    fn add_point<const FUSED: bool>(
+        &self,
+        p: usize,
+        work: &mut Workspace<D>,
+        health: &mut Health,
+        with_block: bool,
+    ) {
+        let step = self.step;
+        let gradients = &step.influences.gradients[step.influences.row(p)];
+        let increment = deformation_increment(gradients, |a| work.displacement[a]);
+        let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
+        let map = &contribution.gradient_map;
+        let stress = contribution.stress.map(|row| row.map(|s| s * contribution.volume));
+        work.gradients.clear();
+        for (gradient, force) in gradients.iter().zip(&mut work.force) {
+            let mut mapped = [0.0; D];
+            for j in 0..D {
+                for i in 0..D {
+                    mapped[j] = multiply_add::<FUSED>(gradient[i], map[i][j], mapped[j]);
+                }
+            }
+            for i in 0..D {
+                for j in 0..D {
+                    force[i] = multiply_add::<FUSED>(stress[i][j], mapped[j], force[i]);
+                }
+            }
+            work.gradients.push(mapped);
+        }
         if with_block {
-            self.block.clear();
-            self.block.resize(size * size, 0.0);
-            self.flux.clear();
-            self.flux.resize(size * dimension * dimension, 0.0);
+            work.batch.push::<D, FUSED>(&work.gradients, &contribution);
         }
     }
+}
 
-    fn gather<const D: usize>(&mut self, nodes: &[u32], displacement: &[f64]) {
-        for &node in nodes {
-            let start = node as usize * D;
-            self.displacement.extend_from_slice(&displacement[start..start + D]);
-        }
+/// Stress and tangent of a point; `None`, and a note in `health`, if the stress is not finite.
+#[inline(always)]
+pub(super) fn respond<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    increment: &[[f64; D]; D],
+    health: &mut Health,
+) -> Option<Contribution<D>> {
+    let points = step.points;
+    let start = StepStart {
+        material: &step.materials[points.body[p] as usize],
+        deformation_gradient: &points.deformation_gradient[p],
+        elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
+        volume_initial: points.volume_initial[p],
+    };
+    let (contribution, state) = mechanics::contribution(frame, &start, increment);
+    if crate::tensor::dense::determinant(increment) <= 0.0 {
+        health.inverted.get_or_insert(p);
     }
+    if !state.kirchhoff_stress.iter().all(|t| t.is_finite()) {
+        health.not_finite.get_or_insert(p);
+        return None;
+    }
+    Some(contribution)
 }
 
 /// dF = 1 + Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7).
@@ -127,86 +249,4 @@ pub fn deformation_increment<const D: usize>(
         }
     }
     increment
-}
-
-#[inline]
-fn add_point<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    p: usize,
-    work: &mut Workspace,
-    health: &mut Health,
-    with_block: bool,
-) {
-    let row = step.influences.offsets[p]..step.influences.offsets[p + 1];
-    let gradients = &step.influences.gradients[row];
-    let displacement = &work.displacement;
-    let increment =
-        deformation_increment(gradients, |a| std::array::from_fn(|i| displacement[a * D + i]));
-    let points = step.points;
-    let start = StepStart {
-        material: &step.materials[points.body[p] as usize],
-        deformation_gradient: &points.deformation_gradient[p],
-        elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
-        volume_initial: points.volume_initial[p],
-    };
-    let (contribution, state) = mechanics::contribution(frame, &start, &increment);
-    if crate::tensor::dense::determinant(&increment) <= 0.0 {
-        health.inverted.get_or_insert(p);
-    }
-    if !state.kirchhoff_stress.iter().all(|t| t.is_finite()) {
-        health.not_finite.get_or_insert(p);
-        return;
-    }
-
-    let count = gradients.len();
-    let width = count * D;
-    let map = &contribution.gradient_map;
-    for (a, gradient) in gradients.iter().enumerate() {
-        let mut mapped = [0.0; D];
-        for j in 0..D {
-            for i in 0..D {
-                mapped[j] += gradient[i] * map[i][j];
-            }
-        }
-        work.gradient[a * D..a * D + D].copy_from_slice(&mapped);
-        for i in 0..D {
-            let mut sum = 0.0;
-            for j in 0..D {
-                sum += contribution.stress[i][j] * mapped[j];
-            }
-            work.force[a * D + i] += sum * contribution.volume;
-        }
-    }
-    if !with_block {
-        return;
-    }
-    for i in 0..D {
-        for j in 0..D {
-            let target = &mut work.flux[(i * D + j) * width..(i * D + j + 1) * width];
-            let tangent =
-                contribution.tangent[i][j].map(|row| row.map(|v| v * contribution.volume));
-            for b in 0..count {
-                for k in 0..D {
-                    let mut sum = 0.0;
-                    for l in 0..D {
-                        sum += tangent[k][l] * work.gradient[b * D + l];
-                    }
-                    target[b * D + k] = sum;
-                }
-            }
-        }
-    }
-    for a in 0..count {
-        for i in 0..D {
-            let target = &mut work.block[(a * D + i) * width..(a * D + i + 1) * width];
-            for j in 0..D {
-                let factor = work.gradient[a * D + j];
-                let source = &work.flux[(i * D + j) * width..(i * D + j + 1) * width];
-                for (t, s) in target.iter_mut().zip(source) {
-                    *t += factor * s;
-                }
-            }
-        }
-    }
 }

@@ -1,62 +1,42 @@
 //! b = -Div P(F(X)): the body force per initial volume that makes a given displacement field
 //! exact (method of manufactured solutions, Lagrangian §7.4).
 //!
-//! The field's first and second derivatives are symbolic; dP/dF is the material's own
-//! consistent tangent in the total frame, so any elastic model serves:
+//! The field's first and second derivatives come from automatic differentiation; dP/dF is the
+//! material's own consistent tangent in the total frame, so any elastic model serves:
 //! Div P_i = (dP_iJ / dF_kL) u_k,LJ.
 
 use nalgebra::Matrix3;
 
 use crate::deck::Scope;
-use crate::deck::expression::{Expression, Variable};
+use crate::deck::expression::{Expression, Jet, Smooth};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::mechanics::{self, StepStart};
 
-const AXES: [Variable; 3] = [Variable::InitialX, Variable::InitialY, Variable::InitialZ];
-
 /// A displacement field of X and s (or t) with its derivatives.
 #[derive(Debug, Clone)]
 pub struct Manufactured {
-    /// u_k,L at k * D + L
-    first: Vec<Expression>,
-    /// u_k,LJ at (k * D + L) * D + J
-    second: Vec<Expression>,
+    field: Vec<Smooth>,
 }
 
 impl Manufactured {
-    /// Differentiates the field, one expression per axis. Error: a function without derivative.
+    /// From one expression per axis. Error: a function without derivative.
     pub fn new(field: &[Expression]) -> Result<Self> {
-        let dimension = field.len();
-        let wrong = |what: String| {
-            Error::Input(format!("load.manufactured: {what}; use smooth functions of X, Y, Z, s"))
-        };
-        let mut first = Vec::new();
-        let mut second = Vec::new();
-        for component in field {
-            for &axis in &AXES[..dimension] {
-                first.push(component.derivative(axis).map_err(wrong)?);
-            }
-        }
-        for gradient in &first {
-            for &axis in &AXES[..dimension] {
-                second.push(gradient.derivative(axis).map_err(wrong)?);
-            }
-        }
-        Ok(Manufactured { first, second })
+        let wrong = |what: String| Error::Input(format!("load.manufactured: {what}"));
+        let field = field.iter().map(|component| component.smooth().map_err(wrong));
+        Ok(Manufactured { field: field.collect::<Result<_>>()? })
+    }
+
+    fn jets<const D: usize>(&self, scope: &Scope) -> [Jet; D] {
+        std::array::from_fn(|k| self.field[k].jet(scope))
     }
 
     /// Force per initial volume, N/m3, at the place and load factor in `scope`. Error: the field
     /// makes the material yield there (the force would depend on the path), or turns it over.
     pub fn force<const D: usize>(&self, material: &Material, scope: &Scope) -> Result<[f64; D]> {
-        let mut gradient = [[0.0; D]; D];
-        for k in 0..D {
-            for l in 0..D {
-                gradient[k][l] =
-                    self.first[k * D + l].value(scope) + if k == l { 1.0 } else { 0.0 };
-            }
-        }
+        let jets: [Jet; D] = self.jets(scope);
+        let gradient = deformation_gradient(&jets);
         let unstrained = Matrix3::identity();
         let start = StepStart {
             material,
@@ -82,7 +62,7 @@ impl Manufactured {
         for k in 0..D {
             for l in 0..D {
                 for j in 0..D {
-                    let curvature = self.second[(k * D + l) * D + j].value(scope);
+                    let curvature = jets[k].second_along(l, j);
                     for (i, f) in force.iter_mut().enumerate() {
                         *f -= contribution.tangent[i][j][k][l] * curvature;
                     }
@@ -93,20 +73,21 @@ impl Manufactured {
     }
 }
 
+/// F = 1 + du/dX.
+fn deformation_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
+    std::array::from_fn(|k| {
+        std::array::from_fn(|l| jets[k].first[l] + if k == l { 1.0 } else { 0.0 })
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::material::Hencky;
 
     fn first_piola(material: &Material, field: &[Expression], scope: &Scope) -> [[f64; 2]; 2] {
-        let derivatives = Manufactured::new(field).expect("smooth");
-        let mut gradient = [[0.0; 2]; 2];
-        for k in 0..2 {
-            for l in 0..2 {
-                gradient[k][l] =
-                    derivatives.first[k * 2 + l].value(scope) + if k == l { 1.0 } else { 0.0 };
-            }
-        }
+        let made = Manufactured::new(field).expect("smooth");
+        let gradient = deformation_gradient::<2>(&made.jets(scope));
         let unit = Matrix3::identity();
         let start = StepStart {
             material,

@@ -4,19 +4,34 @@
 //! |---|---|
 //! | `populated.rs` | which cells hold material, and whose |
 //! | `numbering.rs` | equations over active nodes, contiguous by rank |
+//! | `node_index.rs` | grid nodes to small indices |
+//! | `graph.rs` | which nodes meet |
 //! | `pattern.rs` | exact sparsity, and where every contribution goes |
 //! | `internal.rs` | internal force and tangent stiffness of the points (Lagrangian eq. 27, 28) |
+//! | `places.rs` | where each dense block lies in the rows |
+//! | `kernel.rs` | the same sums, tiled for vector registers |
+//! | `plain.rs` | the same sums once more, written as the formulas read |
+//! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
+//! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 
 pub mod conditions;
+pub mod envelope;
 pub mod external;
+pub mod graph;
 pub mod internal;
+pub mod inverse;
+mod kernel;
 pub mod manufactured;
+pub mod mass;
+pub mod node_index;
 pub mod numbering;
 pub mod pattern;
+pub mod places;
+pub mod plain;
 pub mod populated;
 pub mod scatter;
 

@@ -1,11 +1,11 @@
 //! Equations over active nodes: those of populated cells. Each node belongs to one rank; a
 //! rank's equations are contiguous and ascend with the node number.
 
-use rustc_hash::FxHashMap;
-
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::parallel::{HaloPlan, Partition, World, exchange};
+
+use super::node_index::{NodeIndex, sort_distinct};
 
 /// Local view of the active nodes: owned ones first (ascending), then ghosts.
 #[derive(Debug)]
@@ -21,7 +21,7 @@ pub struct Numbering {
     /// Local index -> global equation number of the node.
     pub global: Vec<i32>,
     /// Grid node -> local index.
-    pub index: FxHashMap<usize, u32>,
+    pub index: NodeIndex,
     /// Owner <-> ghost exchange of nodal values.
     pub halo: HaloPlan,
 }
@@ -43,8 +43,7 @@ impl Touched {
         partition: &Partition<D>,
         mut reached: Vec<usize>,
     ) -> Result<Self> {
-        reached.sort_unstable();
-        reached.dedup();
+        sort_distinct(&mut reached);
         let here = world.rank();
         let mut owned = Vec::with_capacity(reached.len());
         let mut foreign = Vec::new();
@@ -84,15 +83,12 @@ impl Numbering {
                  use a coarser grid or a PETSc with 64-bit indices"
             )));
         }
-        let mut index: FxHashMap<usize, u32> =
-            owned.iter().enumerate().map(|(i, &node)| (node, i as u32)).collect();
-        let halo =
-            HaloPlan::build(world, count, ghosts, |node| index.get(&node).map(|&i| i as usize))?;
         let mut nodes = owned;
-        for &(_, node) in ghosts {
-            index.insert(node, nodes.len() as u32);
-            nodes.push(node);
-        }
+        nodes.extend(ghosts.iter().map(|&(_, node)| node));
+        let index = NodeIndex::new(nodes.iter().copied());
+        let halo = HaloPlan::build(world, count, ghosts, |node| {
+            index.get(node).map(|i| i as usize).filter(|&i| i < count)
+        })?;
         let mut numbers: Vec<f64> =
             (0..nodes.len()).map(|i| if i < count { (offset + i) as f64 } else { -1.0 }).collect();
         halo.forward(world, &mut numbers, 1)?;
@@ -118,6 +114,6 @@ impl Numbering {
 
     /// Local index of a grid node that is active here.
     pub fn local(&self, node: usize) -> Option<usize> {
-        self.index.get(&node).map(|&i| i as usize)
+        self.index.get(node).map(|i| i as usize)
     }
 }

@@ -1,15 +1,16 @@
 //! The node graph: which pairs of nodes meet in a contribution. Rows of owned nodes are final;
 //! rows of nodes owned elsewhere are collected and sent to their owner in a fixed order.
 
-use rustc_hash::FxHashMap;
-
 use crate::error::Result;
 use crate::parallel::{World, exchange};
 
+use super::graph::{Lists, neighbours};
+use super::node_index::NodeIndex;
 use super::numbering::{Numbering, Touched};
+use super::places::Places;
 
 /// Exact sparsity of one rank's rows, in blocks of one node.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Pattern {
     /// Row r of the owned nodes is `offsets[r]..offsets[r + 1]`; rows beyond `numbering.owned`
     /// belong to ghosts this rank contributes to, in local order.
@@ -24,6 +25,10 @@ pub struct Pattern {
     pub sends: Vec<(usize, std::ops::Range<usize>)>,
     /// (rank, owned entry of each received entry), in the sender's order.
     pub receives: Vec<(usize, Vec<u32>)>,
+    /// Local nodes of each support, in the order they were given.
+    pub supports: Lists,
+    /// Where the block of each support lies.
+    pub places: Places,
 }
 
 /// Numbers the active nodes and builds their graph. `supports` are the node lists (global
@@ -36,72 +41,128 @@ pub fn build<'a>(
     supports: impl Iterator<Item = &'a [usize]> + Clone,
 ) -> Result<(Numbering, Pattern)> {
     let Touched { owned, foreign } = touched;
-    let owned_count = owned.len();
-    let first: FxHashMap<usize, u32> = owned
-        .iter()
-        .copied()
-        .chain(foreign.iter().map(|&(_, node)| node))
-        .enumerate()
-        .map(|(i, node)| (node, i as u32))
-        .collect();
-    let mut rows = node_graph(first.len(), &first, supports);
+    // First order of the nodes: owned, then those touched here but owned elsewhere.
+    let nodes: Vec<usize> =
+        owned.iter().copied().chain(foreign.iter().map(|&(_, node)| node)).collect();
+    let first = NodeIndex::new(nodes.iter().copied());
+    let mut lists = index_supports(&first, supports);
+    let holders = lists.transposed(nodes.len());
+    let rows = neighbours(&lists, &holders);
 
-    // Rows of foreign nodes travel to their owners as: node, count, columns...
+    let mut extra = columns_of_others(world, &nodes, &first, &foreign, &rows, owned.len())?;
+    let mut ghosts = foreign.clone();
+    ghosts.extend(
+        extra
+            .iter()
+            .filter(|(_, column)| first.get(*column).is_none())
+            .map(|&(_, c)| (owner_of(c), c)),
+    );
+    ghosts.sort_unstable();
+    ghosts.dedup();
+    let owned_count = owned.len();
+    let numbering = Numbering::build(world, owned, &ghosts)?;
+
+    // From the first order to the final one, in which unseen columns lie between the foreign.
+    let mut local: Vec<u32> = (0..owned_count as u32).collect();
+    local.extend(foreign.iter().map(|&(_, node)| numbering.index[node]));
+    for item in &mut lists.items {
+        *item = local[*item as usize];
+    }
+    extra.sort_unstable();
+    let mut row_of = vec![u32::MAX; numbering.len()];
+    let mut final_rows = Lists::with_capacity(nodes.len(), rows.items.len() + extra.len());
+    let mut extra = extra.into_iter().peekable();
+    for (i, &this) in local.iter().enumerate() {
+        row_of[this as usize] = i as u32;
+        let start = final_rows.items.len();
+        final_rows.items.extend(rows.list(i).iter().map(|&column| local[column as usize]));
+        // Owned nodes ascend already; ghosts and what others added can be out of place.
+        let mut ascends = final_rows.items[start..].iter().all(|&c| (c as usize) < owned_count);
+        while let Some((_, column)) = extra.next_if(|&(row, _)| row == i) {
+            final_rows.items.push(numbering.index[column]);
+            ascends = false;
+        }
+        if !ascends {
+            let row = &mut final_rows.items[start..];
+            row.sort_unstable_by_key(|&column| numbering.global[column as usize]);
+            drop_repeats(&mut final_rows.items, start);
+        }
+        final_rows.close();
+    }
+    let touched = local.iter().enumerate().map(|(i, &this)| (this, i, holders.list(i)));
+    let places = Places::find(&lists, touched, &final_rows, &numbering.global);
+    let places = world.fail_together(places)?;
+    let ghost_start = final_rows.offsets[numbering.owned];
+    let mut pattern = Pattern {
+        offsets: final_rows.offsets,
+        columns: final_rows.items,
+        row_of,
+        ghost_start,
+        sends: Vec::new(),
+        receives: Vec::new(),
+        supports: lists,
+        places,
+    };
+    pattern.plan_exchange(world, &numbering, &ghosts)?;
+    Ok((numbering, pattern))
+}
+
+/// The supports in the first order of the nodes.
+fn index_supports<'a>(
+    first: &NodeIndex,
+    supports: impl Iterator<Item = &'a [usize]> + Clone,
+) -> Lists {
+    let (count, items) =
+        supports.clone().fold((0, 0), |(count, items), list| (count + 1, items + list.len()));
+    let mut lists = Lists::with_capacity(count, items);
+    for support in supports {
+        lists.items.extend(support.iter().map(|&node| first[node]));
+        lists.close();
+    }
+    lists
+}
+
+/// Rows of foreign nodes travel to their owners as: node, count, columns...; returns what
+/// arrived for the owned rows, pairs (row, column's node). Collective.
+fn columns_of_others(
+    world: &World,
+    nodes: &[usize],
+    first: &NodeIndex,
+    foreign: &[(usize, usize)],
+    rows: &Lists,
+    owned: usize,
+) -> Result<Vec<(usize, usize)>> {
     let mut outgoing: Vec<(usize, Vec<u64>)> = Vec::new();
     for (i, &(owner, node)) in foreign.iter().enumerate() {
         if outgoing.last().is_none_or(|(rank, _)| *rank != owner) {
             outgoing.push((owner, Vec::new()));
         }
         let words = &mut outgoing.last_mut().expect("pushed above").1;
-        let row = &rows[owned_count + i];
+        let row = rows.list(owned + i);
         words.push(node as u64);
         words.push(row.len() as u64);
-        words.extend(row.iter().map(|&column| column as u64));
+        words.extend(row.iter().map(|&column| nodes[column as usize] as u64));
     }
-    let incoming = exchange(world, outgoing)?;
-    let mut foreign_columns: Vec<usize> = Vec::new();
-    for (_, words) in &incoming {
+    let mut extra = Vec::new();
+    for (_, words) in &exchange(world, outgoing)? {
         for_each_row(words, |node, columns| {
-            rows[first[&node] as usize].extend(columns.iter().map(|&c| c as usize));
+            let row = first[node] as usize;
+            extra.extend(columns.iter().map(|&column| (row, column as usize)));
         });
     }
-    for row in rows.iter_mut().take(owned_count) {
-        row.sort_unstable();
-        row.dedup();
-        foreign_columns.extend(row.iter().filter(|column| !first.contains_key(column)));
-    }
-    foreign_columns.sort_unstable();
-    foreign_columns.dedup();
-    let mut ghosts = foreign;
-    ghosts.extend(foreign_columns.into_iter().map(|node| (owner_of(node), node)));
-    ghosts.sort_unstable();
-    let numbering = Numbering::build(world, owned, &ghosts)?;
+    Ok(extra)
+}
 
-    let touched_count = rows.len();
-    let mut row_of = vec![u32::MAX; numbering.len()];
-    let mut order: Vec<usize> = vec![0; touched_count];
-    let mut next = 0;
-    for (local, &node) in numbering.nodes.iter().enumerate() {
-        if let Some(&i) = first.get(&node) {
-            row_of[local] = next as u32;
-            order[next] = i as usize;
-            next += 1;
+/// Drops repeats in the sorted tail of `items`.
+fn drop_repeats(items: &mut Vec<u32>, start: usize) {
+    let mut kept = start;
+    for k in start..items.len() {
+        if k == start || items[k] != items[kept - 1] {
+            items[kept] = items[k];
+            kept += 1;
         }
     }
-    let mut offsets = Vec::with_capacity(touched_count + 1);
-    offsets.push(0);
-    let mut columns: Vec<u32> = Vec::with_capacity(rows.iter().map(Vec::len).sum());
-    for &i in &order {
-        let start = columns.len();
-        columns.extend(rows[i].iter().map(|node| numbering.index[node]));
-        columns[start..].sort_unstable_by_key(|&column| numbering.global[column as usize]);
-        offsets.push(columns.len());
-    }
-    let ghost_start = offsets[numbering.owned];
-    let mut pattern =
-        Pattern { offsets, columns, row_of, ghost_start, sends: Vec::new(), receives: Vec::new() };
-    pattern.plan_exchange(world, &numbering, &ghosts)?;
-    Ok((numbering, pattern))
+    items.truncate(kept);
 }
 
 impl Pattern {
@@ -159,32 +220,6 @@ impl Pattern {
         }
         Ok(())
     }
-}
-
-/// Sorted columns (global nodes) of each touched node.
-fn node_graph<'a>(
-    count: usize,
-    first: &FxHashMap<usize, u32>,
-    supports: impl Iterator<Item = &'a [usize]> + Clone,
-) -> Vec<Vec<usize>> {
-    let mut rows: Vec<Vec<usize>> = vec![Vec::new(); count];
-    for support in supports {
-        for node in support {
-            let row = &mut rows[first[node] as usize];
-            row.extend_from_slice(support);
-            // Keeps the duplicates of many overlapping supports from piling up.
-            if row.len() > 512 {
-                row.sort_unstable();
-                row.dedup();
-            }
-        }
-    }
-    for row in &mut rows {
-        row.sort_unstable();
-        row.dedup();
-        row.shrink_to_fit();
-    }
-    rows
 }
 
 fn for_each_row(words: &[u64], mut visit: impl FnMut(usize, &[u64])) {

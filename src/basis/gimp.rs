@@ -2,12 +2,13 @@
 //!
 //! The mean of a hat function over an interval is summed cell by cell, where the hat is linear:
 //! the share of the domain in the cell times the hat at the middle of that piece. This is exact
-//! for any half length and free of cancellation. Parts beyond the grid find no nodes: there the
-//! weights sum to less than one.
+//! for any half length and free of cancellation. The hats of the grid's outermost nodes reach one
+//! cell beyond its edge, as the formula says: a domain that sticks out keeps most of its weight
+//! (Lagrangian Table 7 depends on it), though no longer a sum of one.
 //!
-//! A cell is populated when it is overlapped by more than [`LINE_TOLERANCE`] of its size on
-//! each axis; one that is only touched, or overlapped by round-off, is not. The cell that holds
-//! the centre always counts. The row of a point is exactly the nodes of its populated cells.
+//! A cell is populated when it is overlapped along each axis; one that is only touched, to the
+//! rounding of the position, is not. The cell that holds the centre always counts. The row of a
+//! point is exactly the nodes of its populated cells.
 
 use super::product::{Line, for_each_index, push_row};
 use super::{Influences, lattice_of, outside};
@@ -16,6 +17,10 @@ use crate::grid::lattice::LINE_TOLERANCE;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
+/// An overlap counts as touching up to this many roundings of the numbers it is computed from,
+/// and no more: what the roundings of many steps add up to is a true, if tiny, overlap, the very
+/// case that Ghost stabilisation is for (Ghost Figure 3).
+const ROUNDINGS: f64 = 4.0 * f64::EPSILON;
 /// Half length in cells below which a domain has vanished: its ends are no longer distinct.
 const SMALLEST_REACH: f64 = 1e-13;
 
@@ -27,13 +32,14 @@ pub(super) struct Span {
 }
 
 impl Span {
-    /// Of the scaled interval [low, high] around `centre`, all in cells from the grid's origin.
+    /// Of the scaled interval [low, high] around `centre`, all in cells from the grid's origin;
+    /// overlaps up to `touch` do not count.
     #[inline]
-    fn new(low: f64, centre: f64, high: f64, cells: usize) -> Self {
+    fn new(low: f64, centre: f64, high: f64, cells: usize, touch: f64) -> Self {
         // Conversion to usize saturates: ends beyond the grid are clamped to it.
         let home = (centre as usize).min(cells - 1);
-        let first = ((low + LINE_TOLERANCE) as usize).min(home);
-        let last = ((high - LINE_TOLERANCE).ceil() as usize).clamp(home + 1, cells) - 1;
+        let first = ((low + touch) as usize).min(home);
+        let last = ((high - touch).ceil() as usize).clamp(home + 1, cells) - 1;
         Span { first, last }
     }
 }
@@ -62,7 +68,10 @@ pub(super) fn spans<const D: usize>(
                 points.id[p]
             )));
         }
-        spans[axis] = Span::new(centre - reach, centre, centre + reach, lattice.cells[axis]);
+        let size = x[axis].abs() + lattice.origin[axis].abs() + half[axis];
+        let touch = ROUNDINGS * (size / lattice.spacing[axis]);
+        let (low, high) = (centre - reach, centre + reach);
+        spans[axis] = Span::new(low, centre, high, lattice.cells[axis], touch);
     }
     Ok(spans)
 }
@@ -107,16 +116,24 @@ fn fill(line: &mut Line, span: Span, centre: f64, reach: f64, cells: usize, spac
     let last = span.last - span.first;
     line.reset(span.first, last + 2);
     // Distances are taken from the span's first node, so large grids cost no digits. The
-    // outermost pieces end where the domain ends, or at the grid's edge: an end that only
-    // round-off parts from a grid line continues the hat's straight line.
+    // outermost pieces end where the domain ends: an end that only round-off parts from a grid
+    // line continues the hat's straight line.
     let offset = centre - span.first as f64;
     let (mut low, mut high) = (offset - reach, offset + reach);
     let per_length = 1.0 / (high - low);
+    let edge = (last + 1) as f64;
+    // Beyond the grid's edge the outer halves of the outermost nodes' hats count on.
     if span.first == 0 && low < -LINE_TOLERANCE {
+        let share = low.max(-1.0).abs() * per_length;
+        line.weights[0] += share * (1.0 + 0.5 * low.max(-1.0));
+        line.slopes[0] += share / spacing;
         low = 0.0;
     }
-    let edge = (last + 1) as f64;
     if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
+        let beyond = (high - edge).min(1.0);
+        let share = beyond * per_length;
+        line.weights[last + 1] += share * (1.0 - 0.5 * beyond);
+        line.slopes[last + 1] -= share / spacing;
         high = edge;
     }
     for cell in 0..=last {

@@ -71,6 +71,7 @@ impl<const D: usize> Draft<D> {
             bins,
             node_sets,
             cell_sets,
+            folded: false,
         })
     }
 
@@ -186,18 +187,30 @@ pub(super) fn first_inverted<const D: usize>(
     cells: &[u32],
 ) -> Option<(usize, usize)> {
     let corners = element.node_count();
+    let places: Vec<[f64; D]> = (0..corners).map(|a| element.reference_node(a)).collect();
+    first_inverted_at(element, positions, cells, &places)
+}
+
+/// The first cell, and which of the reference `places`, where det J is not clearly positive.
+pub(super) fn first_inverted_at<const D: usize>(
+    element: Element,
+    positions: &[[f64; D]],
+    cells: &[u32],
+    places: &[[f64; D]],
+) -> Option<(usize, usize)> {
+    let corners = element.node_count();
     let gradients: Vec<[[f64; D]; 8]> =
-        (0..corners).map(|a| element.shape_gradients(&element.reference_node(a))).collect();
+        places.iter().map(|xi| element.shape_gradients(xi)).collect();
     for (cell, nodes) in cells.chunks_exact(corners).enumerate() {
         let x: Vec<[f64; D]> = nodes.iter().map(|&n| positions[n as usize]).collect();
-        for (corner, dn) in gradients.iter().enumerate() {
+        for (place, dn) in gradients.iter().enumerate() {
             let j = element::jacobian(&x, dn);
             // Hadamard: |det J| is at most the product of the columns' lengths.
             let bound: f64 =
                 (0..D).map(|c| j.iter().map(|row| row[c] * row[c]).sum::<f64>().sqrt()).product();
             let det = element::determinant(&j);
             if det.is_nan() || det <= 1e-10 * bound {
-                return Some((cell, corner));
+                return Some((cell, place));
             }
         }
     }

@@ -147,20 +147,51 @@ impl<const D: usize> Mesh<D> {
         allowance: f64,
         hint: Option<usize>,
     ) -> Option<(usize, [f64; D])> {
+        if self.folded {
+            return self.deepest(x).or_else(|| self.nearest(x, allowance));
+        }
         if let Some(cell) = hint
             && let Some((xi, outside)) = self.reference_of(cell, x, 0.0)
             && outside < -EDGE_TOLERANCE
         {
             return Some((cell, xi));
         }
-        let candidates = self.bins.candidates(x);
-        for &cell in candidates {
+        for &cell in self.bins.candidates(x) {
             if let Some((xi, outside)) = self.reference_of(cell as usize, x, 0.0)
                 && outside <= EDGE_TOLERANCE
             {
                 return Some((cell as usize, xi));
             }
         }
+        self.nearest(x, allowance)
+    }
+
+    /// Of the overlapping cells of a folded mesh, the one that holds `x` furthest from its edge,
+    /// on the side where it is not turned over: for a Gauss point that is its own.
+    fn deepest(&self, x: &[f64; D]) -> Option<(usize, [f64; D])> {
+        let mut best: Option<(usize, [f64; D])> = None;
+        let mut depth = EDGE_TOLERANCE;
+        for &cell in self.bins.candidates(x) {
+            let cell = cell as usize;
+            let Some((xi, outside)) = self.reference_of(cell, x, 0.0) else { continue };
+            let positions = self.cell_positions(cell);
+            let nodes = &positions[..self.element.node_count()];
+            let j = element::jacobian(nodes, &self.element.shape_gradients(&xi));
+            if element::determinant(&j) > 0.0
+                && (outside < depth || best.is_none())
+                && outside <= depth
+            {
+                depth = outside;
+                best = Some((cell, xi));
+            }
+        }
+        best
+    }
+
+    /// The outer cell that misses `x` by the smallest fraction of its extent, if that is at
+    /// most `allowance`.
+    fn nearest(&self, x: &[f64; D], allowance: f64) -> Option<(usize, [f64; D])> {
+        let candidates = self.bins.candidates(x);
         let mut best: Option<(usize, [f64; D])> = None;
         let mut smallest = allowance.min(REACH);
         if smallest > 0.0 {

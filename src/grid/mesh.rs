@@ -38,6 +38,9 @@ pub struct Mesh<const D: usize> {
     pub(super) cell_sets: BTreeMap<String, Vec<u32>>,
     /// Smallest edge, m.
     pub(super) size: f64,
+    /// A cell has folded at a corner, as those of a mesh that follows the material may: cells
+    /// then overlap.
+    pub(super) folded: bool,
 }
 
 impl<const D: usize> Mesh<D> {

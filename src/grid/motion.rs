@@ -7,13 +7,18 @@
 //! | `follow = ["x"]` | take the computed displacement along the named axes only |
 //! | `follow = "material"` | take the computed displacement wholly |
 //!
+//! A cell may not turn over. One that follows the material wholly may fold at a corner as long
+//! as its 2-point Gauss rule stays sound: that is what its material points, seeded there, see,
+//! and how finite elements survive distortion beyond their worth.
+//!
 //! A node that no material touches has no computed displacement and stays where it is.
 
 use crate::deck::model::MeshMotion;
 use crate::error::{Error, Result};
 
-use super::check::first_inverted;
+use super::check::{first_inverted, first_inverted_at};
 use super::mesh::Mesh;
+use super::quadrature::gauss_rule;
 
 impl<const D: usize> Mesh<D> {
     /// Moves the mesh at the end of a step. `displacement(node)` is the node's total of the
@@ -51,15 +56,23 @@ impl<const D: usize> Mesh<D> {
             MeshMotion::Material => self.follow(displacement, |_| true),
         };
         let element = self.element;
-        if let Some((cell, corner)) = first_inverted(element, &moved, &self.cells) {
+        let fold = first_inverted(element, &moved, &self.cells);
+        let fault = if *motion == MeshMotion::Material {
+            let gauss: Vec<[f64; D]> = gauss_rule(element, 2).iter().map(|(xi, _)| *xi).collect();
+            fold.and_then(|_| first_inverted_at(element, &moved, &self.cells, &gauss))
+        } else {
+            fold
+        };
+        if let Some((cell, place)) = fault {
             let nodes = self.nodes_of(cell);
-            let node = nodes[corner] as usize;
+            let node = nodes[place % nodes.len()] as usize;
             return Err(Error::Run(format!(
                 "{}: moving the mesh turns over cell {cell} (nodes {nodes:?}) at node {node}, \
                  which goes from {:?} to {:?}; use smaller steps or another motion of the mesh",
                 self.name, self.positions[node], moved[node]
             )));
         }
+        self.folded = fold.is_some();
         self.positions = moved;
         self.refresh();
         Ok(())
@@ -92,12 +105,16 @@ impl<const D: usize> Mesh<D> {
                 self.positions.len()
             )));
         }
-        if let Some((cell, _)) = first_inverted(self.element, &positions, &self.cells) {
+        let gauss: Vec<[f64; D]> = gauss_rule(self.element, 2).iter().map(|(xi, _)| *xi).collect();
+        let fold = first_inverted(self.element, &positions, &self.cells);
+        let fault = first_inverted_at(self.element, &positions, &self.cells, &gauss);
+        if let Some((cell, _)) = fault {
             return Err(Error::File(format!(
                 "{}: stored node positions turn over cell {cell}",
                 self.name
             )));
         }
+        self.folded = fold.is_some();
         self.positions = positions;
         self.refresh();
         Ok(())

@@ -4,13 +4,12 @@
 //! |---|---|
 //! | `mpm` | none: a point |
 //! | `gimp` | x -/+ l_p along each axis |
-//! | `cpdi1` | x + F r, r the corners of the initial domain about the point |
+//! | `cpdi1` | the parallelogram that [`cpdi1::corner_positions`] works with |
 //! | `cpdi2` | the corners that the point carries |
-
-use nalgebra::Vector3;
 
 use super::point_field::append_vector;
 use super::xdmf::Topology;
+use crate::basis::cpdi1;
 use crate::deck::model::Basis;
 use crate::points::{Points, rectangle_corners};
 
@@ -31,14 +30,7 @@ pub fn corners<const D: usize>(points: &Points<D>, basis: Basis, p: usize) -> [[
         Basis::Mpm => [position; 8],
         Basis::Gimp => rectangle_corners(position, points.half_length[p]),
         Basis::Cpdi2 => points.corners[p],
-        Basis::Cpdi1 => {
-            let f = &points.deformation_gradient[p];
-            rectangle_corners([0.0; D], points.half_length_initial[p]).map(|corner| {
-                let r = Vector3::from_fn(|axis, _| corner.get(axis).copied().unwrap_or(0.0));
-                let moved = f * r;
-                std::array::from_fn(|axis| position[axis] + moved[axis])
-            })
-        }
+        Basis::Cpdi1 => cpdi1::corner_positions(points, p),
     }
 }
 
@@ -65,16 +57,27 @@ mod tests {
         points.push_unstrained(0, 0, [1.0, 1.0], 0.08, 1.0, [0.2, 0.1]);
         // a quarter turn
         points.deformation_gradient[0] = Matrix3::new(0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0);
-        let flat = |basis| corner_rows(&points, basis);
+        let flat = |points: &Points<2>, basis| corner_rows(points, basis);
         let expected = [1.1, 0.8, 0.0, 1.1, 1.2, 0.0, 0.9, 1.2, 0.0, 0.9, 0.8, 0.0];
-        for (value, expected) in flat(Basis::Cpdi1).iter().zip(expected) {
+        for (value, expected) in flat(&points, Basis::Cpdi1).iter().zip(expected) {
             approx::assert_relative_eq!(*value, expected, epsilon = 1e-15);
         }
         let expected = [0.8, 0.9, 0.0, 1.2, 0.9, 0.0, 1.2, 1.1, 0.0, 0.8, 1.1, 0.0];
-        for (value, expected) in flat(Basis::Gimp).iter().zip(expected) {
+        for (value, expected) in flat(&points, Basis::Gimp).iter().zip(expected) {
             approx::assert_relative_eq!(*value, expected, epsilon = 1e-15);
         }
-        assert_eq!(flat(Basis::Cpdi2), flat(Basis::Gimp), "an unmoved CPDI2 domain");
+        assert_eq!(
+            flat(&points, Basis::Cpdi2),
+            flat(&points, Basis::Gimp),
+            "an unmoved CPDI2 domain"
+        );
+        // a sub-cell of a mesh: an oblique domain, turned likewise
+        points.corners[0][..4].copy_from_slice(&[[0.9, 0.8], [1.3, 0.8], [1.1, 1.2], [0.7, 1.2]]);
+        points.volume_initial[0] = 0.16;
+        let expected = [1.2, 0.9, 0.0, 1.2, 1.3, 0.0, 0.8, 1.1, 0.0, 0.8, 0.7, 0.0];
+        for (value, expected) in flat(&points, Basis::Cpdi1).iter().zip(expected) {
+            approx::assert_relative_eq!(*value, expected, epsilon = 1e-15);
+        }
         assert_eq!(topology(Basis::Mpm, 2), None);
         assert_eq!(topology(Basis::Cpdi2, 3), Some(Topology::Hexahedron));
     }

@@ -112,6 +112,19 @@ impl Ksp {
         petsc!(KSPSetInitialGuessNonzero(self.raw, bool_of(nonzero)))
     }
 
+    /// Keep what [`Self::extreme_singular_values`] needs. Call before the solve.
+    pub fn set_compute_singular_values(&mut self) -> Result<()> {
+        petsc!(KSPSetComputeSingularValues(self.raw, sys::PETSC_TRUE))
+    }
+
+    /// Estimates of the smallest and largest singular value of the preconditioned matrix, from
+    /// the last solve (Lanczos' or Arnoldi's method; of CG and GMRES only).
+    pub fn extreme_singular_values(&self) -> Result<(f64, f64)> {
+        let (mut largest, mut smallest) = (0.0, 0.0);
+        petsc!(KSPComputeExtremeSingularValues(self.raw, &mut largest, &mut smallest))?;
+        Ok((smallest, largest))
+    }
+
     /// Solves A x = b. Not converging is an outcome, not an error: see [`KspOutcome::require`].
     pub fn solve(&mut self, b: &Vector, x: &mut Vector) -> Result<KspOutcome> {
         petsc!(KSPSolve(self.raw, b.raw(), x.raw()))?;

@@ -29,6 +29,18 @@ pub fn set_default(name: &str, value: &str) -> Result<()> {
 
 /// Is the option set, by whomever? Asking does not count as reading it.
 pub fn is_set(name: &str) -> Result<bool> {
+    let name = dashed(name);
+    Ok(all()?.split_whitespace().any(|word| word.eq_ignore_ascii_case(&name)))
+}
+
+/// Is any option set that starts like this? Asking does not count as reading it.
+pub fn any_set(prefix: &str) -> Result<bool> {
+    let prefix = dashed(prefix);
+    Ok(all()?.split_whitespace().any(|word| word.starts_with(&prefix)))
+}
+
+/// The whole database as PETSc prints it.
+fn all() -> Result<String> {
     require_running()?;
     let mut text = null_mut();
     petsc!(PetscOptionsGetAll(null_mut(), &mut text))?;
@@ -39,8 +51,7 @@ pub fn is_set(name: &str) -> Result<bool> {
             free(text.cast(), 0, c"is_set".as_ptr(), c"options.rs".as_ptr());
         }
     }
-    let name = dashed(name);
-    Ok(all.split_whitespace().any(|word| word.eq_ignore_ascii_case(&name)))
+    Ok(all)
 }
 
 /// The option's value ("" for a bare flag). Asking counts as reading it.

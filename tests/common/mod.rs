@@ -1,6 +1,8 @@
 //! Runs things under `mpirun` from ordinary tests, with a time limit and one job at a time.
 #![allow(dead_code)]
 
+pub mod run;
+
 use std::ffi::OsStr;
 use std::process::{Command, Output, Stdio};
 use std::sync::Mutex;

@@ -1,215 +1,335 @@
-//! Whole runs of the program in temporary folders, and what they leave.
-#![allow(dead_code)]
+//! Runs a deck through the program, as a user would, and reads what it leaves.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Output, Stdio};
+use std::sync::{Condvar, Mutex};
 
-use crate::common::{OPEN_MPI, mpirun};
+use tempfile::TempDir;
 
-pub const PROGRAM: &str = env!("CARGO_BIN_EXE_mpm-par");
+/// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
+const TIME_LIMIT: &str = "900";
+/// Ranks that run at the same time, over all tests of this executable.
+const CORES: usize = 2;
 
-/// `tests/decks/NAME.toml`
-pub fn deck(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/decks").join(format!("{name}.toml"))
-}
+static BUSY: Mutex<usize> = Mutex::new(0);
+static FREED: Condvar = Condvar::new();
 
-/// Solver options whose answers repeat bit by bit on `n` ranks (`petsc::ksp::gathered_lu`).
-pub fn repeatable(n: usize) -> Vec<String> {
-    [
-        "-qs_ksp_type preonly",
-        "-qs_pc_type telescope",
-        &format!("-qs_pc_telescope_reduction_factor {n}"),
-        "-qs_telescope_ksp_type preonly",
-        "-qs_telescope_pc_type lu",
-        "-qs_telescope_pc_factor_mat_solver_type mumps",
-    ]
-    .iter()
-    .flat_map(|words| words.split(' ').map(str::to_string).collect::<Vec<_>>())
-    .collect()
-}
+/// A share of the cores, given back when dropped.
+struct Cores(usize);
 
-/// The words of one run.
-pub fn words(deck: &Path, out: &Path, more: &[&str], n: usize) -> Vec<String> {
-    let mut words = vec![PROGRAM.to_string(), deck.display().to_string()];
-    words.extend(["--out".to_string(), out.display().to_string()]);
-    words.extend(more.iter().map(|word| word.to_string()));
-    words.extend(repeatable(n));
-    words
-}
-
-/// Runs to its end; the output tells how.
-pub fn run(n: usize, deck: &Path, out: &Path, more: &[&str]) -> Output {
-    mpirun(n, &words(deck, out, more, n), &[])
-}
-
-/// [`run`], which must succeed.
-pub fn run_well(n: usize, deck: &Path, out: &Path, more: &[&str]) -> Output {
-    let output = run(n, deck, out, more);
-    assert!(output.status.success(), "{more:?} on {n} ranks\n{}", text(&output));
-    output
-}
-
-pub fn text(output: &Output) -> String {
-    format!(
-        "{}\n{}\n{}",
-        output.status,
-        String::from_utf8_lossy(&output.stdout),
-        String::from_utf8_lossy(&output.stderr)
-    )
-}
-
-/// A run that goes on in the background; killed with all its ranks when dropped.
-pub struct Running(pub Child);
-
-impl Running {
-    pub fn start(n: usize, deck: &Path, out: &Path, more: &[&str]) -> Self {
-        let mut job = Command::new("mpirun");
-        job.args(["-n", &n.to_string(), "--timeout", "120"]).args(words(deck, out, more, n));
-        for (name, value) in OPEN_MPI {
-            job.env(name, value);
+impl Cores {
+    fn take(ranks: usize) -> Self {
+        let wanted = ranks.min(CORES);
+        let mut busy = BUSY.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        while *busy + wanted > CORES {
+            busy = FREED.wait(busy).unwrap_or_else(|poisoned| poisoned.into_inner());
         }
-        job.env_remove("PETSC_OPTIONS").stdin(Stdio::null());
-        job.stdout(Stdio::piped()).stderr(Stdio::piped());
-        Running(job.spawn().expect("mpirun is on the PATH"))
+        *busy += wanted;
+        Cores(wanted)
+    }
+}
+
+impl Drop for Cores {
+    fn drop(&mut self) {
+        *BUSY.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) -= self.0;
+        FREED.notify_all();
+    }
+}
+
+/// `inputs/NAME.toml` of this project.
+pub fn input(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("inputs").join(format!("{name}.toml"))
+}
+
+/// One call of the program.
+#[derive(Clone)]
+pub struct Run {
+    deck: Deck,
+    ranks: usize,
+    words: Vec<String>,
+    env: Vec<(String, String)>,
+}
+
+#[derive(Clone)]
+enum Deck {
+    File(PathBuf),
+    /// Written into the scratch folder as `deck.toml`.
+    Text(String),
+}
+
+/// What a call left: its exit code, its words, and a scratch folder with the results in `out`.
+pub struct Outcome {
+    pub code: i32,
+    pub stdout: String,
+    pub stderr: String,
+    pub folder: TempDir,
+}
+
+impl Run {
+    /// A deck of `inputs/`, on one rank.
+    pub fn of(name: &str) -> Self {
+        Self::file(input(name))
     }
 
-    /// Process numbers of the ranks that live.
-    pub fn ranks(&self) -> Vec<i32> {
-        let mut found = Vec::new();
-        for entry in std::fs::read_dir("/proc").expect("Linux").flatten() {
-            let Some(pid) = entry.file_name().to_str().and_then(|name| name.parse().ok()) else {
-                continue;
-            };
-            let stat = std::fs::read_to_string(entry.path().join("stat")).unwrap_or_default();
-            // pid (name) state parent: the name may hold blanks.
-            let parent = stat.rsplit_once(')').and_then(|(_, rest)| {
-                rest.split_whitespace().nth(1).and_then(|word| word.parse::<u32>().ok())
-            });
-            if parent == Some(self.0.id()) {
-                found.push(pid);
+    pub fn file(path: impl Into<PathBuf>) -> Self {
+        Run { deck: Deck::File(path.into()), ranks: 1, words: Vec::new(), env: Vec::new() }
+    }
+
+    /// A deck given as text.
+    pub fn text(text: &str) -> Self {
+        Run { deck: Deck::Text(text.into()), ..Self::file("") }
+    }
+
+    pub fn ranks(mut self, ranks: usize) -> Self {
+        self.ranks = ranks;
+        self
+    }
+
+    /// `--set ASSIGNMENT`
+    pub fn set(self, assignment: impl Into<String>) -> Self {
+        self.word("--set").word(assignment)
+    }
+
+    /// Any word of the command line.
+    pub fn word(mut self, word: impl Into<String>) -> Self {
+        self.words.push(word.into());
+        self
+    }
+
+    pub fn env(mut self, name: &str, value: &str) -> Self {
+        self.env.push((name.into(), value.into()));
+        self
+    }
+
+    /// Runs whatever comes of it. Without an `--out` of its own the results go to `out` in the
+    /// scratch folder, which is also the working directory.
+    pub fn attempt(&self) -> Outcome {
+        self.attempt_in(tempfile::tempdir().expect("a scratch folder"))
+    }
+
+    /// The same in a folder that an earlier call may have left.
+    pub fn attempt_in(&self, folder: TempDir) -> Outcome {
+        let deck = match &self.deck {
+            Deck::File(path) => path.clone(),
+            Deck::Text(text) => {
+                let path = folder.path().join("deck.toml");
+                std::fs::write(&path, text).expect("the scratch folder is writable");
+                path
+            }
+        };
+        let mut arguments = vec![deck.to_string_lossy().into_owned()];
+        arguments.extend(self.words.iter().cloned());
+        if !self.words.iter().any(|word| word == "--out") {
+            arguments.extend(["--out".to_string(), "out".to_string()]);
+        }
+        let output = self.start(folder.path(), &arguments);
+        let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+        Outcome {
+            code: output.status.code().unwrap_or(-1),
+            stdout: text(&output.stdout),
+            stderr: text(&output.stderr),
+            folder,
+        }
+    }
+
+    fn start(&self, folder: &Path, arguments: &[String]) -> Output {
+        let _cores = Cores::take(self.ranks);
+        let ranks = self.ranks.to_string();
+        let mut job = Command::new("mpirun");
+        job.args(["-n", &ranks, "--timeout", TIME_LIMIT, env!("CARGO_BIN_EXE_mpm-par")])
+            .args(arguments)
+            .current_dir(folder)
+            .stdin(Stdio::null());
+        for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] {
+            job.env(name, "1");
+        }
+        job.env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+            .env("OMPI_MCA_hwloc_base_binding_policy", "none")
+            .env("OMPI_MCA_mpi_yield_when_idle", "1")
+            .env("OMP_NUM_THREADS", "1")
+            .env_remove("PETSC_OPTIONS");
+        job.envs(self.env.iter().map(|(name, value)| (name, value)));
+        job.output().expect("mpirun is on the PATH")
+    }
+
+    /// Runs to a good end.
+    pub fn results(&self) -> Results {
+        let outcome = self.attempt();
+        assert_eq!(
+            outcome.code, 0,
+            "{:?} on {} ranks\n{}\n{}",
+            self.words, self.ranks, outcome.stdout, outcome.stderr
+        );
+        outcome.results()
+    }
+}
+
+impl Outcome {
+    pub fn results(self) -> Results {
+        Results::read(self.folder, "out")
+    }
+
+    /// Every file below the scratch folder, relative, sorted.
+    pub fn files(&self) -> Vec<String> {
+        fn walk(root: &Path, folder: &Path, found: &mut Vec<String>) {
+            for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+                let path = entry.path();
+                if path.is_dir() {
+                    walk(root, &path, found);
+                } else if let Ok(relative) = path.strip_prefix(root) {
+                    found.push(relative.to_string_lossy().into_owned());
+                }
             }
         }
+        let mut found = Vec::new();
+        walk(self.folder.path(), self.folder.path(), &mut found);
+        found.sort();
         found
     }
+}
 
-    pub fn signal(pid: i32, signal: i32) {
-        // SAFETY: sends a signal to a process that this test started.
-        unsafe { libc::kill(pid, signal) };
+/// A results directory.
+pub struct Results {
+    pub summary: serde_json::Value,
+    pub directory: PathBuf,
+    folder: TempDir,
+}
+
+impl Results {
+    fn read(folder: TempDir, name: &str) -> Self {
+        let directory = folder.path().join(name);
+        let text = std::fs::read_to_string(directory.join("summary.json")).expect("summary.json");
+        Results { summary: serde_json::from_str(&text).expect("valid JSON"), directory, folder }
     }
 
-    /// kill -9 for every rank and for mpirun; nothing of the run is left afterwards.
-    pub fn kill(&mut self) {
-        let ranks = self.ranks();
-        for &pid in &ranks {
-            Self::signal(pid, libc::SIGKILL);
+    pub fn into_folder(self) -> TempDir {
+        self.folder
+    }
+
+    /// A number of `summary.json` by its path, for example `newton_iterations.total`.
+    pub fn number(&self, path: &str) -> f64 {
+        let mut value = &self.summary;
+        for word in path.split('.') {
+            value = match word.parse::<usize>() {
+                Ok(index) => &value[index],
+                Err(_) => &value[word],
+            };
         }
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-        let gone = |pid: &i32| !Path::new(&format!("/proc/{pid}")).exists();
-        wait_until(|| ranks.iter().all(gone));
+        value.as_f64().unwrap_or_else(|| panic!("summary.json has no number {path}"))
+    }
+
+    pub fn count(&self, path: &str) -> usize {
+        self.number(path) as usize
+    }
+
+    pub fn verify(&self, name: &str) -> f64 {
+        self.number(&format!("verify.{name}"))
+    }
+
+    pub fn text(&self, name: &str) -> String {
+        std::fs::read_to_string(self.directory.join(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
+    }
+
+    /// A column of `history.csv` by its name without the unit.
+    pub fn history(&self, name: &str) -> Vec<f64> {
+        let text = self.text("history.csv");
+        let mut lines = text.lines();
+        let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
+        let column = header
+            .iter()
+            .position(|title| title.split(" [").next() == Some(name))
+            .unwrap_or_else(|| panic!("no column {name} among {header:?}"));
+        lines
+            .map(|line| line.split(',').nth(column).expect("as wide as the header"))
+            .map(|cell| cell.parse().expect("a number"))
+            .collect()
+    }
+
+    /// Residuals of all attempts at a step, in order.
+    pub fn residuals(&self, step: usize) -> Vec<f64> {
+        self.text("residuals.csv")
+            .lines()
+            .skip(1)
+            .filter_map(|line| {
+                let cells: Vec<&str> = line.split(',').collect();
+                (cells[0] == step.to_string()).then(|| cells[2].parse().expect("a number"))
+            })
+            .collect()
+    }
+
+    /// The points at the end of a step, ordered by their id.
+    pub fn points(&self, step: usize) -> PointTable {
+        PointTable::read(&self.directory.join(format!("points-{step:06}.h5")))
     }
 }
 
-impl Drop for Running {
-    fn drop(&mut self) {
-        if self.0.try_wait().ok().flatten().is_none() {
-            self.kill();
+/// Columns of a points file, rows ordered by id.
+pub struct PointTable {
+    pub id: Vec<i64>,
+    columns: BTreeMap<String, (usize, Vec<f64>)>,
+}
+
+impl PointTable {
+    pub fn read(path: &Path) -> Self {
+        let file = hdf5::File::open(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+        let id: Vec<i64> = file.dataset("id").and_then(|d| d.read_raw()).expect("ids");
+        let mut order: Vec<usize> = (0..id.len()).collect();
+        order.sort_by_key(|&row| id[row]);
+        let mut columns = BTreeMap::new();
+        for name in file.member_names().expect("a list of datasets") {
+            let dataset = file.dataset(&name).expect("a dataset");
+            let shape = dataset.shape();
+            if ["id", "vertices"].contains(&name.as_str())
+                || shape.first() != Some(&id.len())
+                || name.starts_with("domain")
+            {
+                continue;
+            }
+            let width = shape.get(1).copied().unwrap_or(1);
+            let raw: Vec<f64> = dataset.read_raw().expect("numbers");
+            let sorted = order.iter().flat_map(|&row| &raw[row * width..(row + 1) * width]);
+            columns.insert(name, (width, sorted.copied().collect()));
         }
+        PointTable { id: order.iter().map(|&row| id[row]).collect(), columns }
+    }
+
+    /// All numbers of a field, row by row.
+    pub fn field(&self, name: &str) -> &[f64] {
+        let (_, values) =
+            self.columns.get(name).unwrap_or_else(|| panic!("no field {name} in the file"));
+        values
+    }
+
+    /// One component of a field.
+    pub fn component(&self, name: &str, component: usize) -> Vec<f64> {
+        let (width, values) = &self.columns[name];
+        values.chunks_exact(*width).map(|row| row[component]).collect()
     }
 }
 
-/// Waits for at most a minute.
-pub fn wait_until(mut done: impl FnMut() -> bool) {
-    let begin = Instant::now();
-    while !done() {
-        assert!(begin.elapsed() < Duration::from_secs(60), "nothing happened for a minute");
-        std::thread::sleep(Duration::from_millis(5));
+/// Largest difference over the largest magnitude of `b`; infinite if the lengths differ.
+pub fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
+    if a.len() != b.len() {
+        return f64::INFINITY;
     }
-}
-
-/// All fields of the points in a checkpoint, in the order of the points' ids.
-pub fn points_of(checkpoint: &Path) -> BTreeMap<String, Vec<f64>> {
-    let file = hdf5::File::open(checkpoint)
-        .unwrap_or_else(|error| panic!("{}: {error}", checkpoint.display()));
-    let ids: Vec<u64> = file.dataset("points.id").unwrap().read_raw().unwrap();
-    let mut order: Vec<usize> = (0..ids.len()).collect();
-    order.sort_by_key(|&p| ids[p]);
-    let mut fields = BTreeMap::new();
-    for name in file.member_names().unwrap() {
-        let Some(field) = name.strip_prefix("points.") else { continue };
-        let dataset = file.dataset(&name).unwrap();
-        let columns = dataset.shape().get(1).copied().unwrap_or(1);
-        let values: Vec<f64> = dataset.read_raw::<f64>().unwrap();
-        let rows = order.iter().flat_map(|&p| &values[p * columns..(p + 1) * columns]);
-        fields.insert(field.to_string(), rows.copied().collect());
+    let scale = b.iter().fold(0.0f64, |m, v| m.max(v.abs()));
+    let mut worst = 0.0f64;
+    for (a, b) in a.iter().zip(b) {
+        let difference = (a - b).abs();
+        worst = if difference.is_nan() { f64::INFINITY } else { worst.max(difference) };
     }
-    fields
+    if worst == 0.0 { 0.0 } else { worst / scale }
 }
 
-/// Largest difference between two sets of fields, each relative to its field's largest value.
-pub fn difference(a: &BTreeMap<String, Vec<f64>>, b: &BTreeMap<String, Vec<f64>>) -> (f64, String) {
-    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
-    let mut largest = (0.0, String::new());
-    for (name, a) in a {
-        let b = &b[name];
-        assert_eq!(a.len(), b.len(), "{name}");
-        let scale = a.iter().fold(f64::MIN_POSITIVE, |m: f64, x| m.max(x.abs()));
-        let error = a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / scale;
-        if error > largest.0 {
-            largest = (error, name.clone());
-        }
-    }
-    largest
-}
-
-/// A column of `history.csv` by the name before its unit.
-pub fn column(out: &Path, name: &str) -> Vec<f64> {
-    let mut table = csv::Reader::from_path(out.join("history.csv")).expect("history.csv");
-    let header = table.headers().expect("a header").clone();
-    let at = header.iter().position(|word| word.split(" [").next() == Some(name)).expect(name);
-    table.records().map(|row| row.expect("a whole row")[at].parse().expect("a number")).collect()
-}
-
-/// `history.csv` without the columns that tell of the machine.
-pub fn history(out: &Path) -> Vec<Vec<String>> {
-    let mut table = csv::Reader::from_path(out.join("history.csv")).expect("history.csv");
-    let header = table.headers().expect("a header").clone();
-    table
-        .records()
-        .map(|row| {
-            let row = row.expect("a whole row");
-            header
-                .iter()
-                .zip(&row)
-                .filter(|(name, _)| !name.starts_with("wall_seconds"))
-                .map(|(_, word)| word.to_string())
-                .collect()
-        })
-        .collect()
-}
-
-pub fn summary(out: &Path) -> serde_json::Value {
-    let text = std::fs::read_to_string(out.join("summary.json")).expect("summary.json");
-    serde_json::from_str(&text).expect("JSON")
-}
-
-/// Names and contents of a folder.
-pub fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    std::fs::read_dir(folder)
-        .expect("a folder")
-        .map(|entry| {
-            let entry = entry.expect("an entry");
-            let name = entry.file_name().to_string_lossy().into_owned();
-            (name, std::fs::read(entry.path()).expect("a file"))
-        })
-        .collect()
-}
-
-pub fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("a folder");
-    for (name, bytes) in contents(from) {
-        std::fs::write(to.join(name), bytes).expect("written");
-    }
+/// `value` rounds to the printed `text` at its number of significant digits.
+#[track_caller]
+pub fn assert_prints(value: f64, text: &str) {
+    let printed: f64 = text.parse().expect("a printed number");
+    let mantissa = text.split(['e', 'E']).next().unwrap_or(text);
+    let digits = mantissa.split('.').nth(1).map_or(0, str::len) as i32;
+    let exponent: i32 = text.split(['e', 'E']).nth(1).map_or(0, |e| e.parse().expect("exponent"));
+    // Half a unit of the last digit, and a little for ties.
+    let unit = 10f64.powi(exponent - digits);
+    assert!((value - printed).abs() <= 0.5001 * unit, "{value:.6e} is not printed as {text}");
 }

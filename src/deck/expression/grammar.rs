@@ -279,7 +279,6 @@ impl Parser<'_> {
 }
 
 /// Rust writes floats in full, shortest exact digits and no exponent: what exmex can read.
-/// Zero as "0": exmex recognises it when it simplifies derivatives.
 fn number(value: f64) -> String {
     value.to_string()
 }

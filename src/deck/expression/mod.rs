@@ -2,22 +2,27 @@
 //!
 //! | file | idea |
 //! |---|---|
-//! | `mod.rs` | [`Expression`]: evaluation and symbolic derivatives on the exmex crate |
+//! | `mod.rs` | [`Expression`]: evaluation on the exmex crate |
 //! | `grammar.rs` | the deck's grammar, rewritten to the fully parenthesised form that exmex reads |
 //! | `operators.rs` | the operators and functions known to both |
+//! | `jet.rs` | [`Jet`]: numbers that carry their first and second derivatives |
+//! | `smooth.rs` | [`Smooth`]: a formula evaluated on jets |
 
 mod grammar;
-
+pub mod jet;
 mod operators;
+pub mod smooth;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
 
-use exmex::{Differentiate, Express, FlatEx};
+use exmex::{Express, FlatEx};
 
 pub use grammar::vocabulary;
+pub use jet::Jet;
 use operators::Operators;
+pub use smooth::Smooth;
 
 /// Values of the variables. In 2D the third components are zero.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -154,27 +159,11 @@ impl Expression {
         formula.flat.eval(&values[..count]).unwrap_or(f64::NAN)
     }
 
-    /// Symbolic partial derivative. Error: the formula contains a function or an operator
-    /// without a derivative rule (comparisons, `min`, `max`, `if`, `abs`, ...).
-    pub fn derivative(&self, variable: Variable) -> Result<Expression, String> {
-        let Some(formula) = &self.formula else { return Ok(Self::constant(0.0)) };
-        let Some(index) = formula.variables.iter().position(|&v| v == variable) else {
-            return Ok(Self::constant(0.0));
-        };
-        let refused = |why: String| {
-            format!(
-                "\"{}\" has no symbolic derivative with respect to {}: {why}; use + - * / ^ and {}",
-                self.text,
-                variable.name(),
-                operators::DIFFERENTIABLE.join(" ")
-            )
-        };
-        if let Some(name) = operators::without_derivative(formula.flat.unparse()) {
-            return Err(refused(format!("`{name}` has no rule")));
-        }
-        let derived = formula.flat.clone().partial(index).map_err(|e| refused(e.to_string()))?;
-        let normal = derived.unparse().to_string();
-        Self::from_normal_form(normal.clone(), &normal)
+    /// The formula with its derivatives. Error: it contains a function or an operator that is
+    /// not smooth (comparisons, `min`, `max`, `if`, `abs`, ...).
+    pub fn smooth(&self) -> Result<Smooth, String> {
+        let normal = grammar::normalise(&self.text)?;
+        Smooth::parse(&normal).map_err(|why| format!("\"{}\": {why}", self.text))
     }
 
     fn from_normal_form(text: String, normal: &str) -> Result<Self, String> {

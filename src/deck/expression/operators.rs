@@ -8,12 +8,6 @@ pub const FUNCTIONS: [&str; 24] = [
     "floor", "fract", "ln", "log", "log10", "log2", "signum", "sin", "sinh", "sqrt", "tan", "tanh",
 ];
 
-/// Functions with a derivative rule.
-pub const DIFFERENTIABLE: [&str; 18] = [
-    "acos", "acosh", "asin", "asinh", "atan", "atanh", "cos", "cosh", "exp", "ln", "log", "log10",
-    "log2", "sin", "sinh", "sqrt", "tan", "tanh",
-];
-
 /// Functions of two arguments; `min` and `max` take any number.
 pub const BINARY_FUNCTIONS: [&str; 3] = ["atan2", "max", "min"];
 
@@ -28,23 +22,6 @@ pub const CONSTANTS: [(&str, f64); 4] = [
 /// The names that `if(c, a, b)` becomes: `((c) THEN (a)) OTHERWISE (b)`.
 pub const THEN: &str = "__then__";
 pub const OTHERWISE: &str = "__otherwise__";
-
-/// The first operator or function in a normal form that has no derivative rule.
-pub fn without_derivative(normal: &str) -> Option<&'static str> {
-    const SYMBOLS: [&str; 9] = ["<=", ">=", "==", "!=", "<", ">", "&&", "||", "!"];
-    if normal.contains(THEN) {
-        return Some("if");
-    }
-    if let Some(symbol) = SYMBOLS.into_iter().find(|symbol| normal.contains(symbol)) {
-        return Some(symbol);
-    }
-    let words: Vec<&str> = normal.split(|c: char| !c.is_ascii_alphanumeric()).collect();
-    FUNCTIONS
-        .into_iter()
-        .chain(BINARY_FUNCTIONS)
-        .filter(|name| !DIFFERENTIABLE.contains(name))
-        .find(|name| words.contains(name))
-}
 
 /// A quiet NaN with a payload of its own: "the condition did not hold".
 const ELSE: u64 = 0x7ff8_6d70_6d5f_656c;

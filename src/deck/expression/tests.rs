@@ -53,69 +53,94 @@ fn constants_and_dependencies_are_known() {
     sendable::<Expression>();
 }
 
+/// Formulas of X and Y that use every rule, smooth around X in 0.4..1.3, Y = 0.8.
+const SMOOTH: [&str; 20] = [
+    "X^2",
+    "X^3 * Y",
+    "sin(X*Y) / (1 + X^2)",
+    "sqrt(1 + X^2)",
+    "sqrt(X*X + Y)",
+    "exp(-X^2)",
+    "ln(2 + X*Y) + log(3 + X) + log10(2 + X*X) + log2(2+X)",
+    "tan(X/3) + tanh(X*Y) + atan(X*Y) + asin(X/4) + acos(X*Y/4)",
+    "sinh(X) - cosh(2*X*Y) + asinh(X)",
+    "acosh(2 + X*Y) + atanh(X*Y/3) + cbrt(X + Y*Y)",
+    "(1 + X^2)^(X/2)",
+    "2^X",
+    "-X^2 + 3 - X",
+    "s*sin(2*pi*X)*Y",
+    "X / Y / X^3",
+    "atan2(Y, X) + atan2(X, 0.1*Y) + atan2(-X, -Y)",
+    "sin(X*Y)*X^3",
+    "exp(X*Y)/(1+X)",
+    "s*sin(pi*X)*cos(pi*Y)*Z",
+    "X^s",
+];
+
+fn jet(text: &str, x: f64, y: f64) -> Jet {
+    Expression::parse(text).expect(text).smooth().expect(text).jet(&at(x, y))
+}
+
 #[test]
-fn derivatives_agree_with_differences() {
-    for text in [
-        "x^2",
-        "x^3 * y",
-        "sin(x*y) / (1 + x^2)",
-        "sqrt(1 + x^2)",
-        "sqrt(x*x + y)",
-        "exp(-x^2)",
-        "ln(2 + x) + log(3 + x) + log10(2 + x) + log2(2+x)",
-        "tan(x/3) + tanh(x) + atan(x) + asin(x/4) + acos(x/4)",
-        "sinh(x) - cosh(2*x) + asinh(x)",
-        "(1 + x^2)^(x/2)",
-        "2^x",
-        "-x^2 + 3 - x",
-        "s*sin(2*pi*x)*y",
-        "x / y / x^3",
-    ] {
-        let expression = Expression::parse(text).expect(text);
-        let derivative = expression.derivative(Variable::CurrentX).expect(text);
+fn jets_agree_with_values_and_differences() {
+    let h = 1e-5;
+    for text in SMOOTH {
         for x in [0.4, 0.9, 1.3] {
-            let h = 1e-5;
-            let difference = (value(text, x + h, 0.8) - value(text, x - h, 0.8)) / (2.0 * h);
-            let found = derivative.value(&at(x, 0.8));
-            let scale = difference.abs().max(1.0);
-            assert!((found - difference).abs() < 1e-8 * scale, "{text}: {found} {difference}");
+            let y = 0.8;
+            let found = jet(text, x, y);
+            let expected = value(text, x, y);
+            assert!((found.value - expected).abs() <= 1e-14 * expected.abs(), "{text}");
+            let (right, left) = (jet(text, x + h, y), jet(text, x - h, y));
+            let (above, below) = (jet(text, x, y + h), jet(text, x, y - h));
+            let close = |found: f64, high: f64, low: f64| {
+                let difference = (high - low) / (2.0 * h);
+                let scale = difference.abs().max(1.0);
+                assert!((found - difference).abs() < 2e-8 * scale, "{text}: {found} {difference}");
+            };
+            close(found.first[0], right.value, left.value);
+            close(found.first[1], above.value, below.value);
+            for axis in 0..3 {
+                close(found.second_along(axis, 0), right.first[axis], left.first[axis]);
+                close(found.second_along(1, axis), above.first[axis], below.first[axis]);
+            }
         }
     }
 }
 
 #[test]
-fn derivative_of_a_power_exists_at_zero_and_below() {
-    let twice = Expression::parse("x^2").expect("valid");
-    let first = twice.derivative(Variable::CurrentX).expect("valid");
-    assert_eq!(first.value(&at(0.0, 0.0)), 0.0);
-    assert_eq!(first.value(&at(-3.0, 0.0)), -6.0);
-    let second = first.derivative(Variable::CurrentX).expect("valid");
-    assert_eq!(second.value(&at(0.0, 0.0)), 2.0);
-    let other = twice.derivative(Variable::CurrentY).expect("valid");
-    assert_eq!(other.as_constant(), Some(0.0));
+fn only_the_initial_position_carries_derivatives() {
+    let found = jet("x*y*s*t + Z", 0.4, 0.8);
+    assert_eq!(found.first, [0.0, 0.0, 1.0]);
+    assert_eq!(found.second_along(0, 1), 0.0);
+    let constant = Expression::constant(3.5).smooth().unwrap().jet(&Scope::default());
+    assert_eq!((constant.value, constant.first), (3.5, [0.0; 3]));
 }
 
 #[test]
-fn second_derivatives_agree_with_differences() {
-    for text in ["sin(x*y)*x^3", "exp(x*y)/(1+x)", "s*sin(pi*x)*cos(pi*y)"] {
-        let first = Expression::parse(text).expect(text).derivative(Variable::CurrentX).unwrap();
-        let second = first.derivative(Variable::CurrentY).expect(text);
-        let h = 1e-5;
-        let difference =
-            (first.value(&at(0.6, 0.8 + h)) - first.value(&at(0.6, 0.8 - h))) / (2.0 * h);
-        assert!(
-            (second.value(&at(0.6, 0.8)) - difference).abs() < 1e-7 * difference.abs().max(1.0)
-        );
+fn derivatives_of_a_power_exist_at_zero_and_below() {
+    for (text, x, expected) in [
+        ("X^2", 0.0, [0.0, 0.0, 2.0]),
+        ("X^2", -3.0, [9.0, -6.0, 2.0]),
+        ("X^1", 0.0, [0.0, 1.0, 0.0]),
+        ("X^0", 0.0, [1.0, 0.0, 0.0]),
+        ("X^-1", -2.0, [-0.5, -0.25, -0.25]),
+    ] {
+        let found = jet(text, x, 0.0);
+        assert_eq!([found.value, found.first[0], found.second_along(0, 0)], expected, "{text}");
     }
 }
 
 #[test]
-fn derivatives_without_a_rule_are_refused() {
-    for (text, name) in
-        [("abs(x)", "abs"), ("min(x, 1)", "min"), ("if(x < 1, x, 2)", "if"), ("(x < 1)*x", "<")]
-    {
-        let message = Expression::parse(text).unwrap().derivative(Variable::CurrentX).unwrap_err();
-        assert!(message.contains(&format!("`{name}` has no rule")), "{message}");
+fn formulas_with_kinks_are_not_smooth() {
+    for (text, name) in [
+        ("abs(X)", "abs"),
+        ("min(X, 1)", "min"),
+        ("if(X < 1, X, 2)", "if"),
+        ("(X < 1)*X", "<"),
+        ("floor(X)", "floor"),
+    ] {
+        let message = Expression::parse(text).unwrap().smooth().unwrap_err();
+        assert!(message.contains(&format!("`{name}` has no derivative rule")), "{message}");
     }
 }
 

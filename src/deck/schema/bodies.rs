@@ -21,7 +21,8 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             key("model", Choice(&["hencky", "von-mises"]), Required,
                 "Hencky elasticity, alone or with perfect von Mises plasticity."),
-            key("young", Number, Required, "Young's modulus.").unit("Pa").range(POSITIVE),
+            key("young", Number, Required, "Young's modulus; zero (none) only in explicit runs.")
+                .unit("Pa").range(at_least(0.0)),
             key("poisson", Number, Required, "Poisson's ratio.").range(inside(-1.0, 0.5)),
             key("yield", Number, Optional("needed by von-mises, only there"),
                 "rho_y: radius sqrt(2 J2) of the Kirchhoff stress at yield (Lagrangian eq. 43).")
@@ -44,7 +45,7 @@ pub const SECTIONS: &[Section] = &[
                 "Points on a lattice of their own."),
             key("gauss", Count, Optional("none"),
                 "Gauss points per axis and cell: updated-Lagrangian finite elements, with basis = \"mpm\" and motion = { follow = \"material\" }.")
-                .range(between(1.0, 4.0)),
+                .range(between(1.0, 8.0)),
             key("velocity", Expressions("X Y Z"), Optional("zeros"), "Initial velocity.")
                 .unit("m/s"),
         ],

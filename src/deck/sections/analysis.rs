@@ -1,6 +1,6 @@
 //! `[analysis]`, `[method]`, `[ghost]`, `[conditioning]`.
 
-use crate::deck::model::{Analysis, AnalysisType, Basis, Ghost, Method};
+use crate::deck::model::{Analysis, AnalysisType, Basis, Ghost, Mass, Method};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::between;
@@ -93,8 +93,12 @@ fn stable_newmark(table: &Table<'_>, beta: f64, gamma: f64) -> Got<()> {
     Ok(())
 }
 
-/// `ghost`: the section as read, if that succeeded.
-pub fn method(table: &Table<'_>, ghost: Option<&Option<Ghost>>) -> Got<Method> {
+/// `ghost` and `kind`: what was read before, if that succeeded.
+pub fn method(
+    table: &Table<'_>,
+    ghost: Option<&Option<Ghost>>,
+    kind: Option<AnalysisType>,
+) -> Got<Method> {
     let basis: Got<Basis> = table.choice("basis");
     let domain_update = table.choice("domain_update");
     let frame = table.choice("frame");
@@ -111,15 +115,26 @@ pub fn method(table: &Table<'_>, ghost: Option<&Option<Ghost>>) -> Got<Method> {
     let stiffened = ghost.and_then(Option::as_ref).is_some_and(|ghost| {
         ghost.stiffness.or(ghost.stiffness_factor).is_some_and(|value| value > 0.0)
     });
+    let mass = mass?;
+    if xpic && mass == Mass::Consistent && table.given("mass") {
+        return Err(table.problem(
+            "mass",
+            "velocity_update = \"xpic\" stands in for the inverse of the consistent mass; use \
+             mass = \"lumped\"",
+        ));
+    }
+    let mass = if xpic { Mass::Lumped } else { mass };
+    // Explicit steps keep every node that has mass: dropping one would lose its momentum.
+    let keeps_all = stiffened || kind == Some(AnalysisType::Explicit);
     Ok(Method {
         basis: basis?,
         domain_update: domain_update?,
         frame: frame?,
-        mass: mass?,
+        mass,
         stress_update: stress_update?,
         flip,
         xpic: xpic.then(|| order.unwrap_or(2)),
-        drop_below: drop_below?.unwrap_or(if stiffened { 0.0 } else { 1e-12 }),
+        drop_below: drop_below?.unwrap_or(if keeps_all { 0.0 } else { 1e-12 }),
     })
 }
 

@@ -22,10 +22,13 @@ pub struct World<'a> {
     pub method: Option<&'a Method>,
 }
 
-pub fn materials(root: &Table<'_>) -> Got<Vec<Material>> {
+pub fn materials(root: &Table<'_>, kind: Option<AnalysisType>) -> Got<Vec<Material>> {
     let materials = root.named("material", |name, table| {
         let model = table.choice_of("model", &["hencky", "von-mises"]);
         let (young, poisson) = (table.number("young"), table.number("poisson"));
+        if young == Ok(0.0) && kind.is_some_and(|kind| kind != AnalysisType::Explicit) {
+            return Err(table.problem("young", "expected > 0 Pa: only explicit runs do without"));
+        }
         let yield_stress = table.number_if("yield");
         let model = if model? == 0 {
             table.refuse(&["yield"], "only for model = \"von-mises\"")?;

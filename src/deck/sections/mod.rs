@@ -32,9 +32,10 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let title = root.text("title");
     let analysis = root.table("analysis", |table| analysis::analysis(&table));
     let ghost = root.table_if("ghost", |table| analysis::ghost(&table));
-    let method =
-        root.table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok()));
-    let materials = bodies::materials(&root);
+    let kind = analysis.as_ref().ok().map(|analysis| analysis.kind);
+    let method = root
+        .table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok(), kind));
+    let materials = bodies::materials(&root, kind);
     let output = root.table_or_default("output", |table| results::output(&table));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = results::petsc(&root);

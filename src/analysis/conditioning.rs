@@ -1,0 +1,279 @@
+//! κ of M, M~, M lumped, K and K~, the CFL number 1/(h sqrt(λ_max)) and the error of mapped
+//! velocity (Ghost §2.6, 3.5, 5.1.1) while the bodies move rigidly through the grid. Nothing is
+//! solved for; points keep their shape and carry no stress.
+
+use crate::assembly::conditions::{Conditions, StepSpan};
+use crate::assembly::inverse::MassInverse;
+use crate::assembly::{BlockMatrix, internal, mass};
+use crate::deck::model::Frame;
+use crate::error::{Error, Result};
+use crate::output::history::{Conditioning, HistoryRow};
+use crate::parallel::{World, migrate};
+use crate::petsc::log::Phase;
+use crate::points::Points;
+
+use super::balance::imbalance;
+use super::clock::Clock;
+use super::discretise::{Discretisation, Model};
+use super::equilibrium::{add_scalar, ghost_matrix};
+use super::extremes::{self, Extremes};
+use super::mapping;
+use super::reactions::reactions;
+use super::recorder::{Ending, Recorder};
+
+/// Moves the bodies in equal increments and records one row for each position.
+pub fn run<const D: usize>(
+    world: &World,
+    model: &mut Model<D>,
+    points: &mut Points<D>,
+    recorder: &mut Recorder,
+    clock: &mut Clock,
+) -> Result<Ending> {
+    let steps = model.deck.analysis.steps.unwrap_or(1);
+    let total = model.deck.conditioning_displacement.clone().unwrap_or_else(|| vec![0.0; D]);
+    recorder.frame(world, 0, 0.0, points)?;
+    for number in 1..=steps {
+        for x in &mut points.position {
+            for (x, total) in x.iter_mut().zip(&total) {
+                *x += total / steps as f64;
+            }
+        }
+        clock.time(Phase::Migrate, || {
+            migrate(world, &model.partition, &model.grid, points).map(drop)
+        })?;
+        let span = StepSpan {
+            factor_start: (number - 1) as f64 / steps as f64,
+            factor_end: number as f64 / steps as f64,
+            time_start: 0.0,
+            time_end: 0.0,
+        };
+        let mut row = study(world, model, points, clock, span)?;
+        row.step = number;
+        row.wall_seconds = clock.elapsed();
+        recorder.steps_completed = number;
+        clock.time(Phase::Output, || {
+            recorder.step(world, &row, false)?;
+            if recorder.wants_frame(number, span.factor_end, number == steps) {
+                recorder.frame(world, number, span.factor_end, points)?;
+            }
+            Ok(())
+        })?;
+    }
+    Ok(Ending::completed())
+}
+
+/// The numbers of one position. Collective.
+fn study<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    clock: &mut Clock,
+    span: StepSpan,
+) -> Result<HistoryRow> {
+    let deck = &model.deck;
+    let (mesh, conditions) = clock.time(Phase::Locate, || {
+        let mesh = Discretisation::new(world, model, points)?;
+        let conditions = Conditions::evaluate(
+            world,
+            &model.grid,
+            deck.method.basis,
+            &mesh.numbering,
+            points,
+            &deck.boundaries,
+            span,
+        )?;
+        Ok((mesh, conditions))
+    })?;
+    let system = clock.time(Phase::Assemble, || System::assemble(world, model, &mesh, points))?;
+    let free: Vec<bool> =
+        conditions.fixed[..mesh.numbering.owned * D].iter().map(|fixed| !fixed).collect();
+    let numbers = clock
+        .time(Phase::Solve, || system.numbers(world, model, &mesh, points, &conditions, &free))?;
+    let none = vec![0.0; mesh.numbering.owned * D];
+    Ok(HistoryRow {
+        load_factor: span.factor_end,
+        reactions: reactions(
+            world,
+            &model.grid,
+            &mesh.numbering,
+            &deck.boundaries,
+            &conditions,
+            &none,
+            &none,
+        ),
+        ghost_faces: world.sum_usize(mesh.faces.len()),
+        populated_cells: world.sum_usize(mesh.populated.owned.len()),
+        imbalance: imbalance(world, points.len()),
+        conditioning: numbers,
+        ..HistoryRow::default()
+    })
+}
+
+/// The matrices of one position.
+struct System<const D: usize> {
+    mass: BlockMatrix<1>,
+    mass_ghost: BlockMatrix<1>,
+    lumped: Vec<f64>,
+    stiffness: BlockMatrix<D>,
+    stiffness_ghost: BlockMatrix<D>,
+}
+
+impl<const D: usize> System<D> {
+    fn assemble(
+        world: &World,
+        model: &Model<D>,
+        mesh: &Discretisation<D>,
+        points: &Points<D>,
+    ) -> Result<Self> {
+        let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+        let step = mesh.step_points(points, &model.materials);
+        let mass = mass::consistent(world, step, numbering, pattern)?;
+        let mut mass_ghost = mass.clone();
+        if let Some(share) = ghost_matrix(world, mesh, |face| face.mass)? {
+            add(&mut mass_ghost.values, &share.values);
+        }
+        let mut lumped = mass::lumped(step, numbering.len());
+        numbering.halo.reverse_add(world, &mut lumped, 1)?;
+
+        // The tangent of unstrained points is the small-strain stiffness, in any frame.
+        let mut stiffness = BlockMatrix::zeros(pattern);
+        let still = vec![0.0; numbering.len() * D];
+        let mut force = still.clone();
+        internal::assemble(
+            step,
+            Frame::Previous,
+            numbering,
+            pattern,
+            &still,
+            &mut force,
+            Some(&mut stiffness),
+        )?;
+        stiffness.reduce(world, pattern)?;
+        let mut stiffness_ghost = stiffness.clone();
+        if let Some(share) = ghost_matrix(world, mesh, |face| face.stiffness)? {
+            add_scalar(&share, pattern, &mut stiffness_ghost);
+        }
+        Ok(System { mass, mass_ghost, lumped, stiffness, stiffness_ghost })
+    }
+
+    fn numbers(
+        &self,
+        world: &World,
+        model: &Model<D>,
+        mesh: &Discretisation<D>,
+        points: &Points<D>,
+        conditions: &Conditions,
+        free: &[bool],
+    ) -> Result<Conditioning> {
+        let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+        let of_stiffness = |matrix: &BlockMatrix<D>| {
+            extremes::of_matrix(world, numbering, pattern, matrix, free).map(Extremes::ratio)
+        };
+        let masses = [&self.mass, &self.mass_ghost];
+        let stiffnesses = [&self.stiffness, &self.stiffness_ghost];
+        let mut cfl = [0.0; 2];
+        let mut error = [0.0; 2];
+        for (k, matrix) in masses.into_iter().enumerate() {
+            let inverse =
+                MassInverse::<D>::new(world, numbering, pattern, matrix, &conditions.fixed);
+            cfl[k] = or_beyond(
+                0.0,
+                inverse.and_then(|mut inverse| {
+                    let largest = extremes::largest_generalised(
+                        world,
+                        numbering,
+                        pattern,
+                        stiffnesses[k],
+                        &mut inverse,
+                        free,
+                    )?;
+                    Ok(1.0 / (model.grid.cell_size() * largest.sqrt()))
+                }),
+            )?;
+            let step = mesh.step_points(points, &model.materials);
+            error[k] = or_beyond(f64::INFINITY, self.velocity_error(world, mesh, matrix, step))?;
+        }
+        Ok(Conditioning {
+            kappa_mass: self.kappa_of_mass(world, mesh, &self.mass, free)?,
+            kappa_mass_ghost: self.kappa_of_mass(world, mesh, &self.mass_ghost, free)?,
+            kappa_mass_lumped: self.kappa_lumped(world, free),
+            kappa_stiffness: of_stiffness(&self.stiffness)?,
+            kappa_stiffness_ghost: of_stiffness(&self.stiffness_ghost)?,
+            cfl: cfl[0],
+            cfl_ghost: cfl[1],
+            velocity_error: error[0],
+            velocity_error_ghost: error[1],
+        })
+    }
+
+    /// M ⊗ 1 has the eigenvalues of M, but each component has its own held nodes.
+    fn kappa_of_mass(
+        &self,
+        world: &World,
+        mesh: &Discretisation<D>,
+        matrix: &BlockMatrix<1>,
+        free: &[bool],
+    ) -> Result<f64> {
+        let mut all = Extremes::NONE;
+        let mut before: Vec<Vec<bool>> = Vec::new();
+        for k in 0..D {
+            let mask: Vec<bool> = free.iter().skip(k).step_by(D).copied().collect();
+            let known = before.contains(&mask);
+            if world.any(!known) {
+                let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+                all = all.united(extremes::of_matrix(world, numbering, pattern, matrix, &mask)?);
+            }
+            before.push(mask);
+        }
+        Ok(all.ratio())
+    }
+
+    fn kappa_lumped(&self, world: &World, free: &[bool]) -> f64 {
+        let masses = || {
+            let some_free = |node: &usize| (0..D).any(|i| free[node * D + i]);
+            (0..free.len() / D).filter(some_free).map(|node| self.lumped[node])
+        };
+        let smallest = world.min(masses().fold(f64::INFINITY, f64::min));
+        let largest = world.max(masses().fold(f64::NEG_INFINITY, f64::max));
+        Extremes { smallest, largest }.ratio()
+    }
+
+    /// Largest |v - 1| over the nodes that have mass when all points move with v = 1 (Ghost
+    /// Figure 10); no node is held.
+    fn velocity_error(
+        &self,
+        world: &World,
+        mesh: &Discretisation<D>,
+        matrix: &BlockMatrix<1>,
+        step: internal::StepPoints<'_, D>,
+    ) -> Result<f64> {
+        let numbering = &mesh.numbering;
+        let free = vec![false; numbering.len() * D];
+        let mut inverse = MassInverse::<D>::new(world, numbering, &mesh.pattern, matrix, &free)?;
+        let unit = vec![[1.0; D]; step.points.len()];
+        let mut sums = mapping::momentum(step, &unit, numbering.len());
+        numbering.halo.reverse_add(world, sums.as_flattened_mut(), D)?;
+        let owned = numbering.owned * D;
+        let velocity =
+            inverse.solve(&sums.as_flattened()[..owned], &vec![0.0; numbering.len() * D])?;
+        let worst = (0..owned)
+            .filter(|dof| self.lumped[dof / D] > 0.0)
+            .map(|dof| (velocity[dof] - 1.0).abs())
+            .fold(0.0, f64::max);
+        Ok(world.max(worst))
+    }
+}
+
+fn add(values: &mut [f64], shares: &[f64]) {
+    for (value, share) in values.iter_mut().zip(shares) {
+        *value += share;
+    }
+}
+
+/// A mass that cannot be inverted in double precision is a finding here, not a fault.
+fn or_beyond(limit: f64, outcome: Result<f64>) -> Result<f64> {
+    match outcome {
+        Err(Error::Run(_)) => Ok(limit),
+        other => other,
+    }
+}

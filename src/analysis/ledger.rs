@@ -1,0 +1,130 @@
+//! Energies, momenta and work of a dynamic run, step by step, and the fault they reveal: energy
+//! that grows without work means a time step over the stability limit.
+
+use crate::output::history::HistoryRow;
+use crate::parallel::World;
+use crate::points::Points;
+
+use super::update::PointEnergies;
+
+/// Energy may exceed what was there and what work brought in by this share of their sum; the
+/// explicit schemes stray by less in every stable run of the papers.
+const GROWTH: f64 = 0.25;
+/// Below this share of m c^2 energy is round-off: the bodies are at rest.
+const NOISE: f64 = 1e-12;
+
+/// One state's sums over all ranks, and what the last step added.
+#[derive(Debug, Clone, Default)]
+pub struct Entry {
+    pub kinetic: f64,
+    pub strain: f64,
+    pub plastic: f64,
+    pub ghost: f64,
+    /// Work of loads and moved boundaries over the step.
+    pub work: f64,
+    pub momentum: [f64; 3],
+    /// About the origin.
+    pub angular_momentum: [f64; 3],
+}
+
+/// Sums of this rank before they are united.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StepSums {
+    pub energies: PointEnergies,
+    pub ghost: f64,
+    pub work: f64,
+}
+
+impl Entry {
+    /// Adds up all ranks; the kinetic part and the momenta are taken from the points. Collective.
+    pub fn unite<const D: usize>(world: &World, points: &Points<D>, sums: StepSums) -> Self {
+        let mut kinetic = 0.0;
+        let mut momentum = [0.0; 3];
+        let mut angular = [0.0; 3];
+        for p in 0..points.len() {
+            let mut x = [0.0; 3];
+            let mut carried = [0.0; 3];
+            let mass = points.mass[p];
+            for i in 0..D {
+                let v = points.velocity[p][i];
+                kinetic += 0.5 * mass * v * v;
+                x[i] = points.position[p][i];
+                carried[i] = mass * v;
+                momentum[i] += carried[i];
+            }
+            angular[2] += x[0] * carried[1] - x[1] * carried[0];
+            if D == 3 {
+                angular[0] += x[1] * carried[2] - x[2] * carried[1];
+                angular[1] += x[2] * carried[0] - x[0] * carried[2];
+            }
+        }
+        let StepSums { energies, ghost, work } = sums;
+        let all = world.sum_slice(&[
+            kinetic,
+            energies.strain,
+            energies.plastic,
+            ghost,
+            work,
+            momentum[0],
+            momentum[1],
+            momentum[2],
+            angular[0],
+            angular[1],
+            angular[2],
+        ]);
+        Entry {
+            kinetic: all[0],
+            strain: all[1],
+            plastic: all[2],
+            ghost: all[3],
+            work: all[4],
+            momentum: [all[5], all[6], all[7]],
+            angular_momentum: [all[8], all[9], all[10]],
+        }
+    }
+
+    /// Energy of the points, plastic dissipation included.
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.strain + self.plastic
+    }
+}
+
+/// Running sums of a dynamic analysis.
+#[derive(Debug, Clone)]
+pub struct Ledger {
+    start: f64,
+    /// Sum of the work, and of its magnitude.
+    work: f64,
+    gross_work: f64,
+    noise: f64,
+}
+
+impl Ledger {
+    /// `start`: the state before the first step; `wave_energy`: Σ m c^2, J.
+    pub fn new(start: &Entry, wave_energy: f64) -> Self {
+        Ledger { start: start.total(), work: 0.0, gross_work: 0.0, noise: NOISE * wave_energy }
+    }
+
+    /// Books a step into its row. The answer names energy that came from nowhere.
+    pub fn book(&mut self, entry: &Entry, row: &mut HistoryRow) -> Result<(), String> {
+        self.work += entry.work;
+        self.gross_work += entry.work.abs();
+        row.energy_kinetic = entry.kinetic;
+        row.energy_strain = entry.strain;
+        row.energy_plastic = entry.plastic;
+        row.energy_ghost = entry.ghost;
+        row.work_external = self.work;
+        row.momentum = entry.momentum;
+        row.angular_momentum = entry.angular_momentum;
+
+        let gained = entry.total() - self.start - self.work;
+        let brought = self.start + self.gross_work;
+        if gained.is_finite() && gained <= GROWTH * brought + self.noise {
+            return Ok(());
+        }
+        Err(format!(
+            "the energy has grown by {gained:.3e} J without work done on the bodies ({brought:.3e} \
+             J were there or brought in)"
+        ))
+    }
+}

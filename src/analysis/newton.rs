@@ -1,0 +1,86 @@
+//! One step's equations handed to Newton's method, and what comes back: the part that implicit
+//! analyses share.
+
+use crate::error::Result;
+use crate::parallel::World;
+use crate::petsc::log::Phase;
+use crate::points::Points;
+
+use super::clock::Clock;
+use super::discretise::{Discretisation, Model};
+use super::equilibrium::{Equilibrium, NewtonSettings};
+use super::recorder::Recorder;
+use super::solver;
+
+/// A converged step. Vectors without other mention hold the owned degrees of freedom.
+pub struct Converged {
+    /// Nodal increments of local nodes, m.
+    pub displacement: Vec<f64>,
+    /// f_int + K_G u (and the share of inertia that moves with u), N.
+    pub internal: Vec<f64>,
+    /// The same at zero displacement.
+    pub internal_start: Vec<f64>,
+    /// u K_G u / 2 over all ranks, J.
+    pub ghost_energy: f64,
+    /// Normalised residual at the end.
+    pub residual: f64,
+    pub evaluations: usize,
+    pub linear_iterations: usize,
+}
+
+/// What the deck says about the iteration.
+pub fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
+    let deck = &model.deck;
+    NewtonSettings {
+        tolerance: deck.analysis.tolerance,
+        max_evaluations: deck.analysis.max_iterations,
+        frame: deck.method.frame,
+        inverted: deck.analysis.inverted_iterates,
+    }
+}
+
+/// Solves `problem` and reports the iterations of step `number`. The inner `Err` says why it
+/// could not be solved. Collective.
+#[allow(clippy::too_many_arguments)]
+pub fn solve<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    mut problem: Equilibrium<'_, D>,
+    recorder: &mut Recorder,
+    clock: &mut Clock,
+    number: usize,
+) -> Result<std::result::Result<Converged, String>> {
+    let numbering = &mesh.numbering;
+    let most = model.deck.analysis.max_iterations;
+    let mut snes = solver::newton::<D>(world, numbering.total * D, most)?;
+    let mut matrix = clock.time(Phase::Assemble, || {
+        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
+        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
+    })?;
+    let mut solution = matrix.vector()?;
+    let before = clock.elapsed();
+    let outcome = snes.solve(&mut problem, &mut matrix, &mut solution)?;
+    let assembled = problem.assembly_seconds;
+    clock.add(Phase::Assemble, assembled);
+    clock.add(Phase::Solve, clock.elapsed() - before - assembled);
+
+    recorder.iterations(world, number, &problem.errors)?;
+    if !outcome.converged {
+        let point = problem.refused_point(points);
+        let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
+        return Ok(Err(format!("Newton's method failed ({}){detail}", outcome.reason)));
+    }
+    recorder.newton.add(problem.errors.len());
+    recorder.linear.add(outcome.linear_iterations_total);
+    Ok(Ok(Converged {
+        displacement: problem.displacement().to_vec(),
+        internal: problem.internal_force().to_vec(),
+        internal_start: problem.internal_force_at_start().to_vec(),
+        ghost_energy: world.sum(problem.ghost_energy()),
+        residual: problem.errors.last().copied().unwrap_or(0.0),
+        evaluations: problem.errors.len(),
+        linear_iterations: outcome.linear_iterations_total,
+    }))
+}

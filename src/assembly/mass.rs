@@ -1,0 +1,82 @@
+//! M = Σ_p m S^T S (Ghost eq. 7), its row sums Σ_p m S (eq. 15), and M~ = M + gamma_M J (eq. 24).
+//!
+//! All are scalar, the same for each component: M ⊗ 1. The entries of M_G sum to zero, so the
+//! stabilised matrix has the mass and the momentum of the plain one.
+
+use crate::error::Result;
+use crate::parallel::World;
+
+use super::internal::StepPoints;
+use super::{BlockMatrix, Numbering, Pattern};
+
+/// Row sums at the local nodes; ghost shares are not yet sent to their owners. kg
+pub fn lumped<const D: usize>(step: StepPoints<'_, D>, nodes: usize) -> Vec<f64> {
+    let mut mass = vec![0.0; nodes];
+    for p in 0..step.points.len() {
+        let weights = &step.influences.weights[step.influences.row(p)];
+        for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
+            mass[node as usize] += weight * step.points.mass[p];
+        }
+    }
+    mass
+}
+
+/// The consistent matrix in its owners' rows, one dense block per group of points. Collective.
+pub fn consistent<const D: usize>(
+    world: &World,
+    step: StepPoints<'_, D>,
+    numbering: &Numbering,
+    pattern: &Pattern,
+) -> Result<BlockMatrix<1>> {
+    let mut matrix = BlockMatrix::zeros(pattern);
+    let mut block = Vec::new();
+    for group in 0..step.groups.len() {
+        let nodes = step.nodes_of_group(group);
+        let count = nodes.len();
+        block.clear();
+        block.resize(count * count, 0.0);
+        for &p in step.groups.points(group) {
+            let weights = &step.influences.weights[step.influences.row(p)];
+            for (row, weight) in block.chunks_exact_mut(count).zip(weights) {
+                let factor = step.points.mass[p] * weight;
+                for (entry, other) in row.iter_mut().zip(weights) {
+                    *entry += factor * other;
+                }
+            }
+        }
+        matrix.add(numbering, pattern, nodes, &block);
+    }
+    matrix.reduce(world, pattern)?;
+    Ok(matrix)
+}
+
+/// y = (A ⊗ 1) x over the owned rows; `x` holds `D` values per local node.
+pub fn multiply<const D: usize>(
+    matrix: &BlockMatrix<1>,
+    pattern: &Pattern,
+    x: &[f64],
+    y: &mut [f64],
+) {
+    for (row, out) in y.chunks_exact_mut(D).enumerate() {
+        let mut sum = [0.0; D];
+        for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
+            let (value, column) = (matrix.values[entry], pattern.columns[entry] as usize);
+            for (s, x) in sum.iter_mut().zip(&x[column * D..column * D + D]) {
+                *s += value * x;
+            }
+        }
+        out.copy_from_slice(&sum);
+    }
+}
+
+/// x^T (A ⊗ 1) x of this rank's rows; `x` holds `D` values per local node.
+pub fn quadratic_form<const D: usize>(
+    matrix: &BlockMatrix<1>,
+    pattern: &Pattern,
+    owned: usize,
+    x: &[f64],
+) -> f64 {
+    let mut product = vec![0.0; owned * D];
+    multiply::<D>(matrix, pattern, x, &mut product);
+    product.iter().zip(x).map(|(a, b)| a * b).sum()
+}

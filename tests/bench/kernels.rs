@@ -1,0 +1,377 @@
+//! Nanoseconds per point of each part of a step, on one core, beside the machine's limits.
+//!
+//! `cargo bench --bench kernels [-- WORDS]`: the cases whose names hold one of the words.
+
+mod limits;
+mod report;
+
+use std::hint::black_box;
+use std::path::Path;
+
+use mpm_par::analysis::discretise::{Discretisation, Model};
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
+use mpm_par::analysis::{setup, solver, update};
+use mpm_par::assembly::conditions::{Conditions, StepSpan};
+use mpm_par::assembly::internal::{self, StepPoints, deformation_increment};
+use mpm_par::assembly::{BlockMatrix, Numbering};
+use mpm_par::error::Result;
+use mpm_par::mechanics::{self, StepStart};
+use mpm_par::parallel::World;
+use mpm_par::petsc::Session;
+use mpm_par::petsc::snes::NewtonProblem;
+use mpm_par::points::Points;
+use mpm_par::{basis, deck};
+use report::{Sample, machine, resident_bytes, sample};
+
+/// Newton iterations a step takes on the average: shares the cost of what runs once per step.
+const ITERATIONS_PER_STEP: f64 = 4.0;
+const SPAN: StepSpan =
+    StepSpan { factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 0.0 };
+
+struct Case {
+    name: &'static str,
+    dimension: usize,
+    basis: &'static str,
+    plastic: bool,
+    /// Cells per side of the block of material.
+    cells: usize,
+    per_cell: usize,
+}
+
+const CASES: [Case; 6] = [
+    Case {
+        name: "2d-gimp-elastic",
+        dimension: 2,
+        basis: "gimp",
+        plastic: false,
+        cells: 100,
+        per_cell: 2,
+    },
+    Case {
+        name: "2d-gimp-plastic",
+        dimension: 2,
+        basis: "gimp",
+        plastic: true,
+        cells: 100,
+        per_cell: 2,
+    },
+    Case {
+        name: "3d-mpm-elastic",
+        dimension: 3,
+        basis: "mpm",
+        plastic: false,
+        cells: 17,
+        per_cell: 2,
+    },
+    Case {
+        name: "3d-mpm-plastic",
+        dimension: 3,
+        basis: "mpm",
+        plastic: true,
+        cells: 17,
+        per_cell: 2,
+    },
+    Case {
+        name: "3d-gimp-elastic",
+        dimension: 3,
+        basis: "gimp",
+        plastic: false,
+        cells: 13,
+        per_cell: 2,
+    },
+    Case {
+        name: "3d-gimp-plastic",
+        dimension: 3,
+        basis: "gimp",
+        plastic: true,
+        cells: 13,
+        per_cell: 2,
+    },
+];
+
+/// Cost against size: 2D gimp, elastic, 1e4 to 1e6 points.
+const SIZES: [usize; 3] = [50, 158, 500];
+
+impl Case {
+    /// A block of material away from the grid's edges, its points off the cells' middles by
+    /// 0.13 h, so that domains cross grid lines as often as they do after some steps.
+    fn deck(&self) -> String {
+        let Case { dimension, basis, cells, per_cell, .. } = self;
+        let list = |value: f64| format!("{:?}", vec![value; *dimension]);
+        let material =
+            if self.plastic { "model = \"von-mises\"\nyield = 1e3" } else { "model = \"hencky\"" };
+        format!(
+            "title = \"{}\"\n[analysis]\ntype = \"quasi-static\"\nsteps = 1\n\
+             [method]\nbasis = \"{basis}\"\n\
+             [ghost]\nstiffness_factor = 1.0\n\
+             [grid]\ntype = \"lattice\"\norigin = {}\nsize = {}\nh = 1.0\n\
+             [material.m]\n{material}\nyoung = 1e6\npoisson = 0.3\n\
+             [[body]]\nname = \"block\"\nmaterial = \"m\"\ndensity = 1.0\n\
+             shape = {{ box = {{ min = {}, max = {} }} }}\npoints_per_cell = {:?}\n\
+             [[boundary]]\nname = \"low\"\nwhere = {{ box = {{ min = {}, max = {} }} }}\n\
+             fix = {}\n[[load]]\ngravity = {}\n[output]\nevery = 1\nfields = [\"stress\"]\n",
+            self.name,
+            list(-2.0),
+            list(*cells as f64 + 4.0),
+            list(0.0),
+            list(*cells as f64),
+            vec![*per_cell; *dimension],
+            list(-2.0),
+            list(1.0),
+            if *dimension == 2 { "[\"x\", \"y\"]" } else { "[\"x\", \"y\", \"z\"]" },
+            list(-1.0),
+        )
+    }
+}
+
+/// Nanoseconds per point of every part of one case.
+struct Costs {
+    points: usize,
+    nodes_per_point: f64,
+    bytes_per_point: f64,
+    bytes_per_node: f64,
+    basis: Sample,
+    system: Sample,
+    contribution: Sample,
+    assemble: Sample,
+    evaluate: Sample,
+    split: Sample,
+    update: Sample,
+}
+
+impl Costs {
+    /// Everything but the linear solve, per Newton iteration.
+    fn per_iteration(&self) -> f64 {
+        self.evaluate.median
+            + self.split.median
+            + (self.system.median + self.update.median) / ITERATIONS_PER_STEP
+    }
+}
+
+fn main() {
+    let words: Vec<String> =
+        std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
+    let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
+    let (universe, _) = mpi::initialize_with_threading(mpi::Threading::Funneled).expect("MPI");
+    let _session = Session::start(&universe, &[], &[]).expect("PETSc");
+    let world = World::new(universe.world());
+
+    println!("machine: {}", machine());
+    println!("triad bandwidth of one core: {:.1} GB/s", limits::triad());
+    for peak in limits::peaks() {
+        println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
+    }
+    println!(
+        "\nns per point, median (least) of {} runs; basis, system, update: per step",
+        report::RUNS
+    );
+    println!(
+        "| case | points | nodes each | basis | system | stress+tangent | assembly | evaluation | split | update | all but the solve, per iteration |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    for case in CASES.iter().filter(|case| wanted(case.name)) {
+        row(case.name, &costs(&world, case));
+    }
+    if wanted("size") {
+        println!("\ncost against size, 2D gimp, elastic; memory as resident bytes gained");
+        for cells in SIZES {
+            let case = Case {
+                name: "size",
+                dimension: 2,
+                basis: "gimp",
+                plastic: false,
+                cells,
+                per_cell: 2,
+            };
+            let costs = costs(&world, &case);
+            row("size", &costs);
+            println!(
+                "  memory: {:.0} bytes per point, {:.0} bytes per active node (system)",
+                costs.bytes_per_point, costs.bytes_per_node
+            );
+        }
+    }
+}
+
+fn row(name: &str, c: &Costs) {
+    println!(
+        "| {name} | {} | {:.2} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
+        c.points,
+        c.nodes_per_point,
+        c.basis,
+        c.system,
+        c.contribution,
+        c.assemble,
+        c.evaluate,
+        c.split,
+        c.update,
+        c.per_iteration()
+    );
+}
+
+fn costs(world: &World, case: &Case) -> Costs {
+    let measured = match case.dimension {
+        2 => measure::<2>(world, case),
+        _ => measure::<3>(world, case),
+    };
+    measured.expect("the case runs")
+}
+
+fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
+    let deck = deck::read(Path::new("bench.toml"), &case.deck(), &[])?;
+    let before = resident_bytes();
+    let (mut model, mut points) = setup::prepare::<D>(world, deck)?;
+    let bytes_points = resident_bytes() - before;
+    shift(world, &mut model, &mut points)?;
+    let count = points.len();
+
+    let basis_cost = sample(count, || {
+        black_box(basis::map_points(&model.grid, model.deck.method.basis, &points).is_ok());
+    });
+    let system = sample(count, || {
+        black_box(Discretisation::new(world, &model, &points).is_ok());
+    });
+    let before = resident_bytes();
+    let mesh = Discretisation::new(world, &model, &points)?;
+    let conditions = Conditions::evaluate(
+        world,
+        &model.grid,
+        model.deck.method.basis,
+        &mesh.numbering,
+        &points,
+        &model.deck.boundaries,
+        SPAN,
+    )?;
+    let numbering = &mesh.numbering;
+    let displacement = field(&model, numbering);
+    let step = StepPoints {
+        points: &points,
+        materials: &model.materials,
+        influences: &mesh.influences,
+        groups: &mesh.groups,
+        group_nodes: &mesh.group_nodes,
+    };
+    let frame = model.deck.method.frame;
+
+    let increments: Vec<[[f64; D]; D]> = (0..count)
+        .map(|p| {
+            let row = mesh.influences.row(p);
+            let nodes = &mesh.influences.nodes[row.clone()];
+            deformation_increment(&mesh.influences.gradients[row.clone()], |a| {
+                let local = numbering.local(nodes[a]).expect("active");
+                std::array::from_fn(|i| displacement[local * D + i])
+            })
+        })
+        .collect();
+    let contribution = sample(count, || {
+        let mut sum = 0.0;
+        for p in 0..count {
+            let start = StepStart {
+                material: &model.materials[points.body[p] as usize],
+                deformation_gradient: &points.deformation_gradient[p],
+                elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
+                volume_initial: points.volume_initial[p],
+            };
+            let (made, state) = mechanics::contribution::<D>(frame, &start, &increments[p]);
+            sum += black_box(&made).volume + black_box(&state).plastic_increment;
+        }
+        black_box(sum);
+    });
+
+    let mut force = vec![0.0; numbering.len() * D];
+    let mut stiffness = BlockMatrix::<D>::zeros(&mesh.pattern);
+    let assemble = sample(count, || {
+        let sound = internal::assemble(
+            step,
+            frame,
+            numbering,
+            &mesh.pattern,
+            &displacement,
+            &mut force,
+            Some(&mut stiffness),
+        );
+        assert!(black_box(sound).is_ok_and(|health| health.is_sound()));
+    });
+    drop(stiffness);
+
+    let settings = NewtonSettings {
+        tolerance: 1e-9,
+        max_evaluations: 10,
+        frame,
+        inverted: model.deck.analysis.inverted_iterates,
+    };
+    let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
+    let owned = numbering.owned * D;
+    let mut problem =
+        Equilibrium::new(world, &mesh, step, &conditions, &left_out, vec![0.0; owned], settings)?;
+    let values = vec![0.0; mesh.pattern.ghost_start * D * D];
+    let mut matrix = solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)?;
+    let mut f = vec![0.0; owned];
+    let evaluate = sample(count, || {
+        assert!(problem.residual(&displacement[..owned], &mut f).is_ok_and(|sound| sound));
+    });
+    let split = sample(count, || {
+        problem.jacobian(&displacement[..owned], &mut matrix).expect("the matrix has its pattern");
+    });
+    let bytes_system = resident_bytes() - before;
+    drop(problem);
+
+    let mut copies: Vec<Points<D>> = (0..=report::RUNS).map(|_| points.clone()).collect();
+    let update = sample(count, || {
+        let made = update::increments(step, &displacement);
+        let mut moved = copies.pop().expect("one copy a run");
+        update::apply(
+            &model.grid,
+            &model.materials,
+            model.deck.method.basis,
+            model.deck.method.domain_update,
+            numbering,
+            &displacement,
+            &made,
+            &mut moved,
+        )
+        .expect("the increments are sound");
+        black_box(&moved);
+    });
+    Ok(Costs {
+        points: count,
+        nodes_per_point: mesh.influences.nodes.len() as f64 / count as f64,
+        bytes_per_point: bytes_points / count as f64,
+        bytes_per_node: bytes_system / numbering.len() as f64,
+        basis: basis_cost,
+        system,
+        contribution,
+        assemble,
+        evaluate,
+        split,
+        update,
+    })
+}
+
+/// Moves all points by 0.13 h along each axis.
+fn shift<const D: usize>(
+    world: &World,
+    model: &mut Model<D>,
+    points: &mut Points<D>,
+) -> Result<()> {
+    for x in &mut points.position {
+        for x in x {
+            *x += 0.13;
+        }
+    }
+    mpm_par::parallel::migrate(world, &model.partition, &model.grid, points).map(drop)
+}
+
+/// A smooth displacement with strains of some per cent, different along each axis.
+fn field<const D: usize>(model: &Model<D>, numbering: &Numbering) -> Vec<f64> {
+    numbering
+        .nodes
+        .iter()
+        .flat_map(|&node| {
+            let x = model.grid.node_position(node);
+            std::array::from_fn::<f64, D, _>(|i| {
+                0.02 * x[i] + 0.03 * (0.5 * x[(i + 1) % D]).sin() + 0.01 * (i as f64)
+            })
+        })
+        .collect()
+}

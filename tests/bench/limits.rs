@@ -1,0 +1,110 @@
+//! What the machine can do at most, measured beside what the program does: memory bandwidth by
+//! the triad a = b + s c, arithmetic by independent chains of multiply-adds.
+
+use super::report::processor_seconds;
+use std::hint::black_box;
+
+/// One instruction set and its peak rate on one core.
+pub struct Peak {
+    pub name: &'static str,
+    /// 1e9 floating-point operations per second; a multiply-add counts as two.
+    pub gflops: f64,
+}
+
+/// Triad bandwidth of one core, GB/s, counting three arrays once each (best of several passes).
+pub fn triad() -> f64 {
+    const LENGTH: usize = 12_000_000;
+    let (b, c) = (vec![1.5f64; LENGTH], vec![0.25f64; LENGTH]);
+    let mut a = vec![0.0f64; LENGTH];
+    let mut best = f64::INFINITY;
+    for pass in 0..8 {
+        let factor = black_box(3.0 + pass as f64);
+        let begin = processor_seconds();
+        for ((a, b), c) in a.iter_mut().zip(&b).zip(&c) {
+            *a = b + factor * c;
+        }
+        black_box(&mut a);
+        best = best.min(processor_seconds() - begin);
+    }
+    (3 * LENGTH * size_of::<f64>()) as f64 / best * 1e-9
+}
+
+const CHAINS: usize = 16;
+const TURNS: usize = 2_000_000;
+
+/// Peak rates of the instruction sets this processor has.
+pub fn peaks() -> Vec<Peak> {
+    let mut peaks = vec![Peak { name: "baseline", gflops: rate(2, baseline) }];
+    #[cfg(target_arch = "x86_64")]
+    {
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the features were just found.
+            peaks.push(Peak { name: "avx2+fma", gflops: rate(4, |s| unsafe { avx2(s) }) });
+        }
+        if is_x86_feature_detected!("avx512f") {
+            // SAFETY: the feature was just found.
+            peaks.push(Peak { name: "avx-512", gflops: rate(8, |s| unsafe { avx512(s) }) });
+        }
+    }
+    peaks
+}
+
+fn rate(width: usize, run: impl Fn(f64) -> f64) -> f64 {
+    let mut best = f64::INFINITY;
+    for _ in 0..5 {
+        let begin = processor_seconds();
+        black_box(run(black_box(1e-9)));
+        best = best.min(processor_seconds() - begin);
+    }
+    (2 * width * CHAINS * TURNS) as f64 / best * 1e-9
+}
+
+/// What the default target offers: on x86-64 two doubles at a time, multiply and add apart.
+fn baseline(seed: f64) -> f64 {
+    let mut sums = [[seed; 2]; CHAINS];
+    let (m, a) = (black_box(0.999_999), black_box(1e-9));
+    for _ in 0..TURNS {
+        for pair in &mut sums {
+            for value in pair {
+                *value = *value * m + a;
+            }
+        }
+    }
+    sums.iter().flatten().sum()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn avx2(seed: f64) -> f64 {
+    use std::arch::x86_64::*;
+    // Eight chains hide the latency; more would not fit the sixteen registers.
+    let (m, a) = (_mm256_set1_pd(black_box(0.999_999)), _mm256_set1_pd(black_box(1e-9)));
+    let mut sums = [_mm256_set1_pd(seed); 8];
+    for _ in 0..TURNS * CHAINS / 8 {
+        for sum in &mut sums {
+            *sum = _mm256_fmadd_pd(*sum, m, a);
+        }
+    }
+    let mut total = 0.0;
+    for sum in sums {
+        let mut out = [0.0; 4];
+        // SAFETY: four doubles fit the array.
+        unsafe { _mm256_storeu_pd(out.as_mut_ptr(), sum) };
+        total += out.iter().sum::<f64>();
+    }
+    total
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx512f")]
+fn avx512(seed: f64) -> f64 {
+    use std::arch::x86_64::*;
+    let (m, a) = (_mm512_set1_pd(black_box(0.999_999)), _mm512_set1_pd(black_box(1e-9)));
+    let mut sums = [_mm512_set1_pd(seed); CHAINS];
+    for _ in 0..TURNS {
+        for sum in &mut sums {
+            *sum = _mm512_fmadd_pd(*sum, m, a);
+        }
+    }
+    sums.into_iter().map(|sum| _mm512_reduce_add_pd(sum)).sum()
+}
