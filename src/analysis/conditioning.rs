@@ -7,12 +7,15 @@ use crate::assembly::inverse::MassInverse;
 use crate::assembly::{BlockMatrix, internal, mass};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::output::RunState;
 use crate::output::history::{Conditioning, HistoryRow};
-use crate::parallel::{World, migrate};
+use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::imbalance;
+use super::balance::{self, imbalance};
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{add_scalar, ghost_matrix};
@@ -31,16 +34,20 @@ pub fn run<const D: usize>(
 ) -> Result<Ending> {
     let steps = model.deck.analysis.steps.unwrap_or(1);
     let total = model.deck.conditioning_displacement.clone().unwrap_or_else(|| vec![0.0; D]);
-    recorder.frame(world, 0, 0.0, points)?;
-    for number in 1..=steps {
+    let done = match recorder.resumed() {
+        Some(state) => state.count("conditioning.done")? as usize,
+        None => {
+            recorder.frame(world, 0, 0.0, points)?;
+            0
+        }
+    };
+    for number in done + 1..=steps {
         for x in &mut points.position {
             for (x, total) in x.iter_mut().zip(&total) {
                 *x += total / steps as f64;
             }
         }
-        clock.time(Phase::Migrate, || {
-            migrate(world, &model.partition, &model.grid, points).map(drop)
-        })?;
+        clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
         let span = StepSpan {
             factor_start: (number - 1) as f64 / steps as f64,
             factor_end: number as f64 / steps as f64,
@@ -58,6 +65,12 @@ pub fn run<const D: usize>(
             }
             Ok(())
         })?;
+        let mut state = RunState::new();
+        state.set_count("conditioning.done", number as u64);
+        let moment = if number == steps { Moment::End } else { Moment::Step };
+        if let Some(ending) = recorder.end_step(world, model, points, moment, state)? {
+            return Ok(ending);
+        }
     }
     Ok(Ending::completed())
 }
@@ -174,8 +187,14 @@ impl<const D: usize> System<D> {
         let mut cfl = [0.0; 2];
         let mut error = [0.0; 2];
         for (k, matrix) in masses.into_iter().enumerate() {
-            let inverse =
-                MassInverse::<D>::new(world, numbering, pattern, matrix, &conditions.fixed);
+            let inverse = MassInverse::<D>::new(
+                world,
+                &model.grid,
+                numbering,
+                pattern,
+                matrix,
+                &conditions.fixed,
+            );
             cfl[k] = or_beyond(
                 0.0,
                 inverse.and_then(|mut inverse| {
@@ -191,7 +210,10 @@ impl<const D: usize> System<D> {
                 }),
             )?;
             let step = mesh.step_points(points, &model.materials);
-            error[k] = or_beyond(f64::INFINITY, self.velocity_error(world, mesh, matrix, step))?;
+            error[k] = or_beyond(
+                f64::INFINITY,
+                self.velocity_error(world, &model.grid, mesh, matrix, step),
+            )?;
         }
         Ok(Conditioning {
             kappa_mass: self.kappa_of_mass(world, mesh, &self.mass, free)?,
@@ -243,13 +265,15 @@ impl<const D: usize> System<D> {
     fn velocity_error(
         &self,
         world: &World,
+        grid: &Grid<D>,
         mesh: &Discretisation<D>,
         matrix: &BlockMatrix<1>,
         step: internal::StepPoints<'_, D>,
     ) -> Result<f64> {
         let numbering = &mesh.numbering;
         let free = vec![false; numbering.len() * D];
-        let mut inverse = MassInverse::<D>::new(world, numbering, &mesh.pattern, matrix, &free)?;
+        let mut inverse =
+            MassInverse::<D>::new(world, grid, numbering, &mesh.pattern, matrix, &free)?;
         let unit = vec![[1.0; D]; step.points.len()];
         let mut sums = mapping::momentum(step, &unit, numbering.len());
         numbering.halo.reverse_add(world, sums.as_flattened_mut(), D)?;

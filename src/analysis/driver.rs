@@ -213,6 +213,9 @@ impl Run<'_> {
 /// What usually helps when a step cannot be solved, given what the deck does not yet use.
 fn advice(deck: &Deck) -> Vec<String> {
     let mut advice = Vec::new();
+    if matches!(deck.analysis.kind, AnalysisType::Explicit | AnalysisType::Conditioning) {
+        return vec!["smaller steps: analysis.steps, or analysis.cfl = 0.5 in its place".into()];
+    }
     if deck.ghost.as_ref().is_none_or(|g| g.stiffness.is_none() && g.stiffness_factor.is_none()) {
         advice.push("stabilise small overlaps: [ghost] stiffness_factor = 1.0".to_string());
     }

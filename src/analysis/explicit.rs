@@ -8,12 +8,14 @@ use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::point_forces;
 use crate::deck::model::{AnalysisType, Mass, StressUpdate};
 use crate::error::{Error, Result};
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance::{self, imbalance};
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
@@ -41,29 +43,57 @@ pub fn run<const D: usize>(
     let start =
         StepSums { energies: update::energies(points, &model.materials), ..StepSums::default() };
     let mut ledger = Ledger::new(&Entry::unite(world, points, start), wave_energy);
-    recorder.frame(world, 0, 0.0, points)?;
+    let mut framed = match recorder.resumed() {
+        Some(state) => {
+            steps.restore(state)?;
+            ledger.restore(state)?;
+            None
+        }
+        None => {
+            recorder.frame(world, 0, 0.0, points)?;
+            Some(0)
+        }
+    };
+    let state_of = |steps: &TimeSteps, ledger: &Ledger| {
+        let mut state = RunState::new();
+        steps.save(&mut state);
+        ledger.save(&mut state);
+        state
+    };
     while let Some(span) = steps.next(limit) {
         let number = steps.number();
-        let (mut solved, sums) = advance(world, model, points, clock, span)
-            .map_err(|error| at_step(error, number, span))?;
+        let at = |why: &str| format!("step {number} (to t = {:.6e} s): {why}", span.time_end);
+        // The points are as they were where a step fails.
+        let before = update::Snapshot::of(points);
+        let (mut solved, sums) = match advance(world, model, points, clock, span) {
+            Ok(done) => done,
+            Err(Error::Run(why)) => {
+                before.restore(points);
+                if framed != Some(number - 1) {
+                    recorder.frame(world, number - 1, span.time_start, points)?;
+                }
+                recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
+                let culprit = world.first_message(not_finite(points));
+                let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
+                return Ok(Ending::failed(at(&format!("{why}{detail}"))));
+            }
+            Err(other) => return Err(other),
+        };
         let entry = Entry::unite(world, points, sums);
         let mut row = std::mem::take(&mut solved.row);
         row.step = number;
         row.wall_seconds = clock.elapsed();
-        let booked = ledger.book(&entry, &mut row);
-        if let Err(why) = booked {
+        if let Err(why) = ledger.book(&entry, &mut row) {
+            // The row shows what happened.
+            recorder.step(world, &row, false)?;
             let (limit, _) = limit_now(model, points);
-            return Ok(Ending::failed(format!(
-                "step {number} (t = {:.6e} s): {why}; the time step {:.3e} s is too large \
-                     (stability limit of full cells {limit:.3e} s){}",
-                span.time_end,
+            return Ok(Ending::failed(at(&format!(
+                "{why}; the time step {:.3e} s is too large (stability limit of full cells \
+                 {limit:.3e} s){}",
                 row.dt,
                 unstabilised(model)
-            )));
+            ))));
         }
-        clock
-            .time(Phase::Migrate, || balance::settle(world, model, points))
-            .map_err(|error| at_step(error, number, span))?;
         steps.accept(span);
         recorder.steps_completed = number;
         if steps.follows_limit() {
@@ -75,13 +105,34 @@ pub fn run<const D: usize>(
             if recorder.wants_frame(number, span.time_end, last) {
                 let time = span.time_end;
                 recorder.frame(world, number, time, points)?;
+                framed = Some(number);
                 let Solved { mesh, displacement, reaction, .. } = &solved;
                 recorder.grid_frame(world, model, mesh, number, time, displacement, reaction)?;
             }
             Ok(())
         })?;
+        clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+        let moment = if last { Moment::End } else { Moment::Step };
+        let state = state_of(&steps, &ledger);
+        let stop =
+            clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;
+        if let Some(ending) = stop {
+            return Ok(ending);
+        }
     }
     Ok(Ending::completed())
+}
+
+/// The first point whose state is not a number.
+fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
+    let p = (0..points.len()).find(|&p| {
+        let sound = points.velocity[p].iter().chain(&points.kirchhoff_stress[p]);
+        !sound.chain(&points.position[p]).all(|value| value.is_finite())
+    })?;
+    Some(format!(
+        "point {} at {:?} m has velocity {:?} m/s, which with its stress is not finite",
+        points.id[p], points.position[p], points.velocity[p]
+    ))
 }
 
 /// What makes a consistent mass without Ghost share unstable is not the time step.
@@ -91,16 +142,6 @@ fn unstabilised<const D: usize>(model: &Model<D>) -> &'static str {
         "; the consistent mass is not stabilised: [ghost] mass_factor = 0.25 bounds its condition"
     } else {
         ""
-    }
-}
-
-/// Says where in time an error of the run happened.
-pub fn at_step(error: Error, number: usize, span: StepSpan) -> Error {
-    match error {
-        Error::Run(text) => {
-            Error::Run(format!("step {number} (t = {:.6e} s): {text}", span.time_start))
-        }
-        other => other,
     }
 }
 
@@ -159,7 +200,7 @@ fn advance<const D: usize>(
     };
     let mut inverse = None;
     let mut velocity = timed(&mut || {
-        let inverse = inverse.insert(mass.inverse(world, &mesh, &conditions.fixed)?);
+        let inverse = inverse.insert(mass.inverse(world, grid, &mesh, &conditions.fixed)?);
         let step = mesh.step_points(points, &model.materials);
         let sums = mapping::momentum(step, &points.velocity, nodes);
         let velocity = inverse.solve(sums, &held_velocity)?;

@@ -57,6 +57,7 @@ impl GridMass {
     pub fn inverse<'a, const D: usize>(
         &'a self,
         world: &'a World,
+        grid: &Grid<D>,
         mesh: &'a Discretisation<D>,
         held: &'a [bool],
     ) -> Result<Inverse<'a, D>> {
@@ -64,6 +65,7 @@ impl GridMass {
             GridMass::Lumped(mass) => How::Lumped(mass),
             GridMass::Consistent { matrix, .. } => How::Consistent(Box::new(MassInverse::new(
                 world,
+                grid,
                 &mesh.numbering,
                 &mesh.pattern,
                 matrix,

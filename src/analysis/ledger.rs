@@ -1,6 +1,8 @@
 //! Energies, momenta and work of a dynamic run, step by step, and the fault they reveal: energy
 //! that grows without work means a time step over the stability limit.
 
+use crate::error::Result;
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::points::Points;
@@ -10,8 +12,9 @@ use super::update::PointEnergies;
 /// Energy may exceed what was there and what work brought in by this share of their sum; the
 /// explicit schemes stray by less in every stable run of the papers.
 const GROWTH: f64 = 0.25;
-/// Below this share of m c^2 energy is round-off: the bodies are at rest.
-const NOISE: f64 = 1e-12;
+/// Below this share of m c^2, the energy of a strain of 1e-4, nothing is judged: bodies at rest,
+/// and boundaries that start to move and do work only from the second step on.
+const NOISE: f64 = 1e-8;
 
 /// One state's sums over all ranks, and what the last step added.
 #[derive(Debug, Clone, Default)]
@@ -105,8 +108,33 @@ impl Ledger {
         Ledger { start: start.total(), work: 0.0, gross_work: 0.0, noise: NOISE * wave_energy }
     }
 
+    /// Writes the sums into a checkpoint.
+    pub fn save(&self, state: &mut RunState) {
+        for (name, value) in self.fields() {
+            state.set(name, value);
+        }
+    }
+
+    /// Takes the sums out of a checkpoint.
+    pub fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.start = state.number("ledger.start")?;
+        self.work = state.number("ledger.work")?;
+        self.gross_work = state.number("ledger.gross_work")?;
+        self.noise = state.number("ledger.noise")?;
+        Ok(())
+    }
+
+    fn fields(&self) -> [(&'static str, f64); 4] {
+        [
+            ("ledger.start", self.start),
+            ("ledger.work", self.work),
+            ("ledger.gross_work", self.gross_work),
+            ("ledger.noise", self.noise),
+        ]
+    }
+
     /// Books a step into its row. The answer names energy that came from nowhere.
-    pub fn book(&mut self, entry: &Entry, row: &mut HistoryRow) -> Result<(), String> {
+    pub fn book(&mut self, entry: &Entry, row: &mut HistoryRow) -> std::result::Result<(), String> {
         self.work += entry.work;
         self.gross_work += entry.work.abs();
         row.energy_kinetic = entry.kinetic;

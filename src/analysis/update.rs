@@ -132,6 +132,38 @@ pub fn deform<const D: usize>(
     sum
 }
 
+/// The state that [`deform`] and [`follow`] overwrite, to go back to where a step fails.
+pub struct Snapshot<const D: usize> {
+    deformation_gradient: Vec<Matrix3<f64>>,
+    elastic_left_cauchy_green: Vec<Matrix3<f64>>,
+    kirchhoff_stress: Vec<Matrix3<f64>>,
+    plastic_strain: Vec<f64>,
+    dissipation: Vec<f64>,
+    half_length: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Snapshot<D> {
+    pub fn of(points: &Points<D>) -> Self {
+        Snapshot {
+            deformation_gradient: points.deformation_gradient.clone(),
+            elastic_left_cauchy_green: points.elastic_left_cauchy_green.clone(),
+            kirchhoff_stress: points.kirchhoff_stress.clone(),
+            plastic_strain: points.plastic_strain.clone(),
+            dissipation: points.dissipation.clone(),
+            half_length: points.half_length.clone(),
+        }
+    }
+
+    pub fn restore(self, points: &mut Points<D>) {
+        points.deformation_gradient = self.deformation_gradient;
+        points.elastic_left_cauchy_green = self.elastic_left_cauchy_green;
+        points.kirchhoff_stress = self.kirchhoff_stress;
+        points.plastic_strain = self.plastic_strain;
+        points.dissipation = self.dissipation;
+        points.half_length = self.half_length;
+    }
+}
+
 /// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
 /// those of the step's start. `displacement` is the one that made the increments.
 pub fn follow<const D: usize>(

@@ -6,6 +6,7 @@
 //! there: `cg`, `jacobi`, relative tolerance 1e-14), component by component.
 
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 use crate::parallel::World;
 use crate::petsc::{Ksp, Matrix, options};
 
@@ -37,8 +38,15 @@ pub struct MassInverse<'a, const D: usize> {
 enum Method<const D: usize> {
     /// A factor, and which one serves each component.
     Direct(Vec<Envelope>, [usize; D]),
-    Iterative(Vec<f64>),
+    Iterative(Jacobi),
     Petsc(Box<Ksp>),
+}
+
+/// Per owned node; zero where there is no mass.
+struct Jacobi {
+    inverse_diagonal: Vec<f64>,
+    /// The lumped mass: where the iteration starts. For a constant field that is the solution.
+    inverse_row_sum: Vec<f64>,
 }
 
 impl<'a, const D: usize> MassInverse<'a, D> {
@@ -46,6 +54,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     /// are held at zero. Collective. Error: a factor that does not exist, with its node.
     pub fn new(
         world: &'a World,
+        grid: &Grid<D>,
         numbering: &'a Numbering,
         pattern: &'a Pattern,
         matrix: &'a BlockMatrix<1>,
@@ -64,22 +73,29 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         {
             let (factors, which) = factors::<D>(matrix, pattern, &free).map_err(|row| {
                 Error::Run(format!(
-                    "the consistent mass matrix is not positive definite: the node number {} \
+                    "the consistent mass matrix is not positive definite: the node at {:?} m \
                      hardly carries any mass; stabilise it ([ghost] mass_factor = 0.25) or use \
                      method.mass = \"lumped\"",
-                    numbering.nodes[row]
+                    grid.node_position(numbering.nodes[row])
                 ))
             })?;
             Method::Direct(factors, which)
         } else {
-            let inverse = diagonal.iter().map(|d| if *d == 0.0 { 0.0 } else { 1.0 / d });
-            Method::Iterative(inverse.collect())
+            let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
+            Method::Iterative(Jacobi {
+                inverse_diagonal: diagonal.iter().map(one_over).collect(),
+                inverse_row_sum: mass::row_sums(matrix, pattern, rows)
+                    .iter()
+                    .map(one_over)
+                    .collect(),
+            })
         };
         Ok(MassInverse { world, numbering, pattern, matrix, free, method, iterations: 0 })
     }
 
     /// Solves for the free values. `rhs`: owned degrees of freedom; `prescribed`: local ones,
-    /// read where held. Returns local values, ghosts included. Collective.
+    /// read where held. Returns local values, ghosts included. Collective. Error: a right-hand
+    /// side that is not finite, or no convergence.
     pub fn solve(&mut self, rhs: &[f64], prescribed: &[f64]) -> Result<Vec<f64>> {
         let owned = self.numbering.owned * D;
         let mut x = vec![0.0; self.numbering.len() * D];
@@ -91,7 +107,13 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             }
         }
         let mut b = rhs.to_vec();
-        if self.world.any(moved) {
+        let bad = rhs.iter().any(|b| !b.is_finite());
+        let marks = [f64::from(u8::from(moved)), f64::from(u8::from(bad))];
+        let marks = self.world.sum_slice(&marks);
+        if marks[1] > 0.0 {
+            return Err(Error::Run("momentum or force at the nodes is not finite".into()));
+        }
+        if marks[0] > 0.0 {
             self.numbering.halo.forward(self.world, &mut x, D)?;
             let mut share = vec![0.0; owned];
             mass::multiply::<D>(self.matrix, self.pattern, &x, &mut share);
@@ -124,13 +146,20 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     }
 
     fn conjugate_gradients(&mut self, b: &[f64]) -> Result<Vec<f64>> {
-        let Method::Iterative(inverse) = &self.method else { return Ok(b.to_vec()) };
+        let Method::Iterative(jacobi) = &self.method else { return Ok(b.to_vec()) };
+        let inverse = &jacobi.inverse_diagonal;
         let (world, owned) = (self.world, b.len());
-        let mut x = vec![0.0; owned];
-        let mut r = b.to_vec();
         // Local: the product reads ghosts.
         let mut p = vec![0.0; self.numbering.len() * D];
         let mut product = vec![0.0; owned];
+        for (dof, b) in b.iter().enumerate() {
+            p[dof] = b * jacobi.inverse_row_sum[dof / D];
+        }
+        let mut x = p[..owned].to_vec();
+        self.numbering.halo.forward(world, &mut p, D)?;
+        self.multiply_free(&p, &mut product);
+        let mut r: Vec<f64> = b.iter().zip(&product).map(|(b, p)| b - p).collect();
+        p.fill(0.0);
         let dot = |a: &[f64], b: &[f64], scaled: bool| -> Vec<f64> {
             let mut sums = vec![0.0; D];
             for (node, (a, b)) in a.chunks_exact(D).zip(b.chunks_exact(D)).enumerate() {
@@ -141,8 +170,8 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             }
             world.sum_slice(&sums)
         };
+        let start = dot(b, b, true);
         let mut size = dot(&r, &r, true);
-        let start = size.clone();
         let mut factor = [0.0; D];
         let mut iteration = 0;
         loop {
@@ -168,12 +197,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                 }
             }
             self.numbering.halo.forward(world, &mut p, D)?;
-            mass::multiply::<D>(self.matrix, self.pattern, &p, &mut product);
-            for (value, free) in product.iter_mut().zip(&self.free) {
-                if !free {
-                    *value = 0.0;
-                }
-            }
+            self.multiply_free(&p, &mut product);
             let curvature = dot(&p[..owned], &product, false);
             if (0..D).any(|k| active[k] && curvature[k] <= 0.0) {
                 return Err(Error::Run(
@@ -199,6 +223,16 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         }
         self.iterations += iteration;
         Ok(x)
+    }
+
+    /// Rows of free degrees of freedom; zero in the others. `x` is zero there too.
+    fn multiply_free(&self, x: &[f64], product: &mut [f64]) {
+        mass::multiply::<D>(self.matrix, self.pattern, x, product);
+        for (value, free) in product.iter_mut().zip(&self.free) {
+            if !free {
+                *value = 0.0;
+            }
+        }
     }
 
     fn by_petsc(&mut self, b: &[f64]) -> Result<Vec<f64>> {

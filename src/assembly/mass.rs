@@ -69,6 +69,13 @@ pub fn multiply<const D: usize>(
     }
 }
 
+/// Sum of each owned row.
+pub fn row_sums(matrix: &BlockMatrix<1>, pattern: &Pattern, owned: usize) -> Vec<f64> {
+    (0..owned)
+        .map(|row| matrix.values[pattern.offsets[row]..pattern.offsets[row + 1]].iter().sum())
+        .collect()
+}
+
 /// x^T (A ⊗ 1) x of this rank's rows; `x` holds `D` values per local node.
 pub fn quadratic_form<const D: usize>(
     matrix: &BlockMatrix<1>,

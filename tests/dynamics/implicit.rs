@@ -1,0 +1,112 @@
+//! Newmark's method and its dissipative relative on a vibrating bar.
+
+use crate::common::run::{Results, Run};
+
+fn bar(steps: usize) -> Run {
+    Run::of("bar-vibration").set(format!("analysis.steps={steps}")).set("output.every=100000")
+}
+
+fn error(run: Run) -> f64 {
+    run.results().verify("displacement_error")
+}
+
+#[test]
+fn second_order_in_time_against_the_exact_solution() {
+    for alpha in ["0.0", "-0.1"] {
+        let errors: Vec<f64> = [18, 36, 72]
+            .map(|steps| error(bar(steps).set(format!("analysis.hht_alpha={alpha}"))))
+            .to_vec();
+        for pair in errors.windows(2) {
+            let rate = (pair[0] / pair[1]).log2();
+            assert!((1.8..2.3).contains(&rate), "alpha {alpha}: {errors:?}");
+        }
+        assert!(errors[2] < 1e-2, "{errors:?}");
+    }
+}
+
+#[test]
+fn the_explicit_method_finds_the_same_vibration() {
+    let run = bar(1200).set("analysis.type=\"explicit\"").set("method.stress_update=\"usf\"");
+    assert!(error(run.clone()) < 5e-3);
+    assert!(error(run.set("method.mass=\"lumped\"")) < 5e-3);
+}
+
+/// Total energy after each step.
+fn energies(run: &Results) -> Vec<f64> {
+    let strain = run.history("energy_strain");
+    run.history("energy_kinetic").iter().zip(strain).map(|(a, b)| a + b).collect()
+}
+
+/// h / c = 1.5625 ms: 78 ms are 50 times that, a fifth of the period.
+#[test]
+fn steps_of_fifty_cells_stay_stable_where_the_end_is_a_sliver() {
+    for alpha in ["0.0", "-0.1"] {
+        let run = Run::of("bar-vibration")
+            .set("method.basis=\"gimp\"")
+            .set("method.domain_update=\"stretch\"")
+            .set("body.0.points_per_cell=[2,2]")
+            .set("analysis.steps=100")
+            .set("analysis.duration=7.8125")
+            .set(format!("analysis.hht_alpha={alpha}"))
+            // The free end reaches 1e-6 of a cell into an empty one.
+            .set("grid.origin=[-1.5625e-8, 0.0]")
+            .set("boundary.0.where={ box = { min = [-1, 0], max = [1e-3, 1] } }")
+            .set("output.every=100000")
+            .results();
+        let energies = energies(&run);
+        let start = 0.25 * (1e-5 * 5.0 * std::f64::consts::PI).powi(2) * 0.015625;
+        let highest = energies.iter().copied().fold(0.0, f64::max);
+        assert!(highest < 1.05 * start, "alpha {alpha}: {highest} {start}");
+        let last = *energies.last().unwrap();
+        match alpha {
+            "0.0" => assert!(last > 0.9 * start, "{last} {start}"),
+            _ => assert!(last < 0.5 * start, "{last} {start}"),
+        }
+    }
+}
+
+#[test]
+fn a_step_response_starts_with_the_acceleration_of_the_load() {
+    // Free fall from rest is exact from the first step on.
+    let run = Run::text(FALL).results();
+    assert!(run.verify("displacement_error") < 1e-12);
+    let work = *run.history("work_external").last().unwrap();
+    let kinetic = *run.history("energy_kinetic").last().unwrap();
+    assert!((work / kinetic - 1.0).abs() < 1e-9, "{work} {kinetic}");
+}
+
+const FALL: &str = r#"
+title = "Fall"
+[analysis]
+type = "implicit-dynamic"
+steps = 5
+duration = 0.5
+[method]
+basis = "gimp"
+domain_update = "stretch"
+[ghost]
+mass_factor = 0.25
+stiffness_factor = 0.1
+[grid]
+type = "lattice"
+size = [4, 5]
+h = 0.5
+[material.soft]
+model = "hencky"
+young = 1000
+poisson = 0.3
+[[body]]
+name = "block"
+material = "soft"
+density = 10
+shape = { disc = { centre = [2, 3.6], radius = 0.8 } }
+[[load]]
+gravity = [0, -10]
+[[verify]]
+name = "displacement_error"
+field = "displacement"
+exact = ["0", "-5*t^2"]
+norm = "max"
+[output]
+every = 100
+"#;

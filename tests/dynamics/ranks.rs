@@ -1,0 +1,70 @@
+//! The number of ranks is not seen in the answer.
+
+use super::ghosts::contact;
+use crate::common::run::{Results, Run, relative_difference};
+
+#[track_caller]
+fn assert_same(one: &Results, other: &Results, step: usize, tolerance: f64) {
+    for column in ["energy_kinetic", "energy_strain", "energy_plastic", "ghost_faces"] {
+        let difference = relative_difference(&other.history(column), &one.history(column));
+        assert!(difference <= tolerance, "{column}: {difference:e}");
+    }
+    let (a, b) = (one.points(step), other.points(step));
+    assert_eq!(a.id, b.id);
+    for field in ["displacement", "velocity", "stress"] {
+        let difference = relative_difference(b.field(field), a.field(field));
+        assert!(difference <= tolerance, "{field}: {difference:e}");
+    }
+}
+
+fn on_all_ranks(run: &Run, step: usize) {
+    let one = run.results();
+    for ranks in [2, 3, 4] {
+        assert_same(&one, &run.clone().ranks(ranks).results(), step, 1e-9);
+    }
+}
+
+#[test]
+fn explicit_consistent() {
+    on_all_ranks(&contact(40), 40);
+}
+
+#[test]
+fn explicit_lumped_plastic() {
+    let run = contact(60)
+        .set("method.mass=\"lumped\"")
+        .set("method.stress_update=\"musl\"")
+        .set("material.soft.model=\"von-mises\"")
+        .set("material.soft.yield=5");
+    on_all_ranks(&run, 60);
+}
+
+#[test]
+fn implicit() {
+    let run = contact(5)
+        .set("analysis.type=\"implicit-dynamic\"")
+        .set("ghost.stiffness_factor=0.1")
+        .set("analysis.tolerance=1e-11");
+    on_all_ranks(&run, 5);
+}
+
+#[test]
+fn the_mass_by_petsc_options() {
+    let run = contact(10);
+    let one = run.results();
+    for ranks in [1, 2] {
+        let other = run.clone().ranks(ranks).word("-mass_ksp_type").word("cg").results();
+        assert_same(&one, &other, 10, 1e-9);
+    }
+}
+
+#[test]
+fn collision_in_space() {
+    let run = Run::of("ghost-collision-3d")
+        .set("body.1.shape.translate=[0.3, 0.36, 0.3]")
+        .set("analysis.steps=20")
+        .set("analysis.duration=0.1")
+        .set("output.every=20");
+    let one = run.results();
+    assert_same(&one, &run.ranks(3).results(), 20, 1e-9);
+}
