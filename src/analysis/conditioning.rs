@@ -8,7 +8,6 @@ use crate::assembly::{BlockMatrix, internal, mass};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
 use crate::output::history::{Conditioning, HistoryRow};
-use crate::output::summary::Status;
 use crate::parallel::{World, migrate};
 use crate::petsc::log::Phase;
 use crate::points::Points;
@@ -60,7 +59,7 @@ pub fn run<const D: usize>(
             Ok(())
         })?;
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// The numbers of one position. Collective.

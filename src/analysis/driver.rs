@@ -14,12 +14,13 @@ use crate::output::ResultsDirectory;
 use crate::output::log::Log;
 use crate::output::report::{self, Banner, Failure};
 use crate::output::summary::Status;
-use crate::parallel::World;
+use crate::parallel::{World, signals};
 use crate::petsc::log::Stages;
 use crate::petsc::session::{self, Session};
 
+use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
-use super::recorder::{Ending, Recorder};
+use super::recorder::{Ending, Recorder, Resume};
 use super::{conditioning, explicit, implicit_dynamic, quasi_static};
 use super::{plan, setup};
 
@@ -116,19 +117,48 @@ impl Run<'_> {
         let world = self.world;
         let mut clock = Clock::new(Some(Stages::register()?));
         let resolved = deck::resolved(&deck);
-        let (mut model, mut points) = setup::prepare::<D>(world, deck)?;
+        let physics = checkpointing::physics_of(world, &deck)?;
+        let (mut model, mut points, resume) = match &self.arguments.restart {
+            None => {
+                let (model, points) = setup::prepare::<D>(world, deck)?;
+                (model, points, None)
+            }
+            Some(choice) => {
+                let out = &self.arguments.out;
+                let found = checkpointing::find::<D>(world, &physics, choice, out, &mut self.log)?;
+                self.log.say(&report::restart(&found.path, found.step, found.ranks, world.size()));
+                let resume = Resume {
+                    state: found.state.clone(),
+                    same_directory: checkpointing::lies_in(world, &found.path, out),
+                };
+                let (used, step) = (found.path.clone(), found.step);
+                let (model, points) = setup::restore(world, deck, found)?;
+                (model, points, Some((resume, used, step)))
+            }
+        };
         self.log.say(&report::plan(&plan::of(world, &model, &points)?));
         if self.arguments.check {
             self.log.say("The deck is good; nothing was run (--check).");
             return Ok(());
         }
-        let directory =
-            ResultsDirectory::create(&self.arguments.out, self.arguments.force, world.comm())?;
-        directory.write_decks(&self.text, &resolved, world.comm())?;
-        self.log.attach(&directory, false, world.comm())?;
-        let conditioning = model.deck.analysis.kind == AnalysisType::Conditioning;
+        let (out, comm) = (&self.arguments.out, world.comm());
+        let goes_on = resume.as_ref().filter(|(resume, ..)| resume.same_directory);
+        let directory = match goes_on {
+            Some((_, used, step)) => {
+                let directory = ResultsDirectory::reopen(out, comm)?;
+                checkpointing::set_later_aside(world, out, used, *step)?;
+                directory
+            }
+            None => ResultsDirectory::create(out, self.arguments.force, comm)?,
+        };
+        directory.write_decks(&self.text, &resolved, comm)?;
+        self.log.attach(&directory, goes_on.is_some(), comm)?;
+        let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
+        let resume = resume.map(|(resume, ..)| resume);
+        let (log, versions) = (self.log, self.versions);
         let mut recorder =
-            Recorder::create(world, &model.deck, directory, self.log, self.versions, conditioning)?;
+            Recorder::create(world, &model.deck, directory, log, versions, checkpointer, resume)?;
+        signals::listen();
         clock.end_setup();
 
         let outcome = match model.deck.analysis.kind {
@@ -145,9 +175,12 @@ impl Run<'_> {
                 implicit_dynamic::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
         };
-        let ending = match outcome {
-            Ok(ending) => ending,
-            Err(error) => Ending { status: Status::Failed, reason: error.to_string() },
+        let (ending, kind): (_, fn(String) -> Error) = match outcome {
+            Ok(ending) => (ending, Error::Run),
+            Err(error) => {
+                let kind = if error.exit_code() == 3 { Error::File } else { Error::Run };
+                (Ending::failed(error.to_string()), kind)
+            }
         };
         let figures = quasi_static::figures(world, &model, &points, &recorder)?;
         let summary = recorder.finish(world, &model.deck, &points, &clock, figures, &ending)?;
@@ -165,10 +198,15 @@ impl Run<'_> {
             what: ending.reason.clone(),
             last_good_step: Some(recorder.steps_completed),
             results: Some(recorder.directory()),
-            advice: advice(&model.deck),
+            // Whoever sent a signal needs no advice, and no numerics heals a full disk.
+            advice: if ending.on_request || kind(String::new()).exit_code() == 3 {
+                Vec::new()
+            } else {
+                advice(&model.deck)
+            },
             ..Failure::default()
         };
-        Err(Error::Run(report::failure(&failure)))
+        Err(kind(report::failure(&failure)))
     }
 }
 

@@ -9,7 +9,6 @@ use crate::assembly::external::point_forces;
 use crate::deck::model::{AnalysisType, Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
-use crate::output::summary::Status;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
@@ -54,16 +53,13 @@ pub fn run<const D: usize>(
         let booked = ledger.book(&entry, &mut row);
         if let Err(why) = booked {
             let (limit, _) = limit_now(model, points);
-            return Ok(Ending {
-                status: Status::Failed,
-                reason: format!(
-                    "step {number} (t = {:.6e} s): {why}; the time step {:.3e} s is too large \
+            return Ok(Ending::failed(format!(
+                "step {number} (t = {:.6e} s): {why}; the time step {:.3e} s is too large \
                      (stability limit of full cells {limit:.3e} s){}",
-                    span.time_end,
-                    row.dt,
-                    unstabilised(model)
-                ),
-            });
+                span.time_end,
+                row.dt,
+                unstabilised(model)
+            )));
         }
         clock
             .time(Phase::Migrate, || balance::settle(world, model, points))
@@ -85,7 +81,7 @@ pub fn run<const D: usize>(
             Ok(())
         })?;
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// What makes a consistent mass without Ghost share unstable is not the time step.

@@ -12,7 +12,6 @@ use crate::deck::model::AnalysisType;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::output::history::HistoryRow;
-use crate::output::summary::Status;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
@@ -52,13 +51,12 @@ pub fn run<const D: usize>(
     recorder.frame(world, 0, 0.0, points)?;
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
-        let stopped = |why: String, completed: usize| Ending {
-            status: Status::Stopped,
-            reason: format!(
+        let stopped = |why: String, completed: usize| {
+            Ending::stopped(format!(
                 "step {number} of {steps} (t = {:.6e} s) could not be solved: {why}; the last \
                  finished step is {completed}",
                 span.time_end
-            ),
+            ))
         };
         let solved = match solve_step(world, model, points, recorder, clock, span, number)? {
             Ok(solved) => solved,
@@ -106,7 +104,7 @@ pub fn run<const D: usize>(
         }
         clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// A finished step: its row but for the ledger, and the grid as it was solved.

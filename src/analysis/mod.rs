@@ -22,8 +22,10 @@
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
 //! | a run from command line to results | `driver.rs`, `plan.rs` | |
 //! | rows, frames, summary | `recorder.rs`, `clock.rs` | |
+//! | checkpoints and restarts | `checkpointing.rs` | |
 
 pub mod balance;
+pub mod checkpointing;
 pub mod clock;
 pub mod conditioning;
 pub mod discretise;

@@ -7,6 +7,7 @@ use crate::assembly::external::{map_forces, point_forces};
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
 use crate::parallel::World;
@@ -14,6 +15,7 @@ use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance::{self, imbalance};
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::Equilibrium;
@@ -35,7 +37,19 @@ pub fn run<const D: usize>(
     let steps = analysis.steps.unwrap_or(1);
     let mut stepping = Stepping::new(steps, 0.0, analysis.on_failure, analysis.smallest_step);
     let mut totals = Totals::default();
-    recorder.frame(world, 0, 0.0, points)?;
+    match recorder.resumed() {
+        Some(state) => {
+            stepping.restore(state)?;
+            totals.restore(state)?;
+        }
+        None => recorder.frame(world, 0, 0.0, points)?,
+    }
+    let state_of = |stepping: &Stepping, totals: &Totals| {
+        let mut state = RunState::new();
+        stepping.save(&mut state);
+        totals.save(&mut state);
+        state
+    };
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
         match solve_step(world, model, points, recorder, clock, span, number)? {
@@ -74,22 +88,34 @@ pub fn run<const D: usize>(
                     model.grid = grid;
                 }
                 clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+                let moment = match (stepping.next_span(), ended) {
+                    (None, _) => Moment::End,
+                    (_, true) => Moment::Step,
+                    (_, false) => Moment::PartOfStep,
+                };
+                let state = state_of(&stepping, &totals);
+                let stop = clock.time(Phase::Output, || {
+                    recorder.end_step(world, model, points, moment, state)
+                })?;
+                if let Some(ending) = stop {
+                    return Ok(ending);
+                }
             }
             Err(why) => {
                 recorder.log.say(&format!("step {number} refused: {why}"));
                 if !stepping.refuse() {
-                    let status = Status::Stopped;
-                    let reason = format!(
+                    let state = state_of(&stepping, &totals);
+                    recorder.keep_last_state(world, model, points, state)?;
+                    return Ok(Ending::stopped(format!(
                         "step {number} of {steps} could not be solved: {why}; the last finished \
                          step is {}",
                         stepping.completed()
-                    );
-                    return Ok(Ending { status, reason });
+                    )));
                 }
             }
         }
     }
-    Ok(Ending { status: Status::Completed, reason: String::new() })
+    Ok(Ending::completed())
 }
 
 /// Sums over the run so far.
@@ -97,6 +123,19 @@ pub fn run<const D: usize>(
 struct Totals {
     work: f64,
     ghost: f64,
+}
+
+impl Totals {
+    fn save(&self, state: &mut RunState) {
+        state.set("totals.work", self.work);
+        state.set("totals.ghost", self.ghost);
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.work = state.number("totals.work")?;
+        self.ghost = state.number("totals.ghost")?;
+        Ok(())
+    }
 }
 
 /// A finished step: its row, and the grid as it was solved.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::assembly::Numbering;
 use crate::deck::Deck;
-use crate::deck::model::Every;
+use crate::deck::model::{AnalysisType, Every};
 use crate::error::Result;
 use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
@@ -13,11 +13,13 @@ use crate::output::log::Log;
 use crate::output::progress::{NewtonReport, Progress, StepReport};
 use crate::output::summary::{Count, Status};
 use crate::output::{
-    GridFrame, GridSeries, History, PointField, PointsSeries, Residuals, ResultsDirectory, Summary,
+    GridFrame, GridSeries, History, PointField, PointsSeries, Residuals, ResultsDirectory,
+    RunState, Summary,
 };
 use crate::parallel::World;
 use crate::points::Points;
 
+use super::checkpointing::{Checkpointer, Moment};
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 
@@ -41,6 +43,19 @@ pub struct Recorder {
     pub versions: BTreeMap<String, String>,
     populated_cells: usize,
     imbalance: f64,
+    checkpointer: Checkpointer,
+    resumed: Option<RunState>,
+    /// s that earlier parts of the run took.
+    earlier_seconds: f64,
+    /// s up to the last row, earlier parts included.
+    seconds: f64,
+}
+
+/// What a restart hands to the recorder.
+pub struct Resume {
+    pub state: RunState,
+    /// The results directory is that of the earlier part: its tables and series go on.
+    pub same_directory: bool,
 }
 
 /// How a run ended.
@@ -48,31 +63,69 @@ pub struct Recorder {
 pub struct Ending {
     pub status: Status,
     pub reason: String,
+    /// A signal asked for it.
+    pub on_request: bool,
+}
+
+impl Ending {
+    pub fn completed() -> Self {
+        Ending { status: Status::Completed, reason: String::new(), on_request: false }
+    }
+
+    /// The run could not go on but keeps what it has.
+    pub fn stopped(reason: String) -> Self {
+        Ending { status: Status::Stopped, reason, on_request: false }
+    }
+
+    pub fn failed(reason: String) -> Self {
+        Ending { status: Status::Failed, reason, on_request: false }
+    }
 }
 
 impl Recorder {
-    /// Opens the files in a fresh results directory.
+    /// Opens the files in a results directory: fresh ones, or those of the run that is resumed.
     pub fn create(
         world: &World,
         deck: &Deck,
         directory: ResultsDirectory,
         log: Log,
         versions: BTreeMap<String, String>,
-        conditioning: bool,
+        checkpointer: Checkpointer,
+        resume: Option<Resume>,
     ) -> Result<Self> {
         let comm = world.comm();
         let layout = Layout {
             dimension: deck.dimension,
             boundaries: deck.boundaries.iter().map(|boundary| boundary.name.clone()).collect(),
-            conditioning,
+            conditioning: deck.analysis.kind == AnalysisType::Conditioning,
         };
         let fields = PointField::parse_list(&deck.output.fields)?;
-        Ok(Recorder {
+        let (basis, dimension) = (deck.method.basis, deck.dimension);
+        let goes_on = resume.as_ref().filter(|resume| resume.same_directory);
+        let (history, residuals, points, grid) = match goes_on {
+            None => (
+                History::create(&directory, layout, comm)?,
+                Residuals::create(&directory, comm)?,
+                PointsSeries::create(&directory, &fields, basis, dimension),
+                GridSeries::create(&directory),
+            ),
+            Some(Resume { state, .. }) => {
+                let count = |name: &str| state.count(name).map(|n| n as usize);
+                let step = count("recorder.steps")?;
+                (
+                    History::resume(&directory, layout, count("recorder.history_rows")?, comm)?,
+                    Residuals::resume(&directory, count("recorder.residual_rows")?, comm)?,
+                    PointsSeries::resume(&directory, &fields, basis, dimension, step, comm)?,
+                    GridSeries::resume(&directory, step, comm)?,
+                )
+            }
+        };
+        let mut recorder = Recorder {
             log,
-            history: History::create(&directory, layout, comm)?,
-            residuals: Residuals::create(&directory, comm)?,
-            points: PointsSeries::create(&directory, &fields, deck.method.basis, deck.dimension),
-            grid: GridSeries::create(&directory),
+            history,
+            residuals,
+            points,
+            grid,
             directory,
             progress: Progress::default(),
             every: deck.output.every,
@@ -85,7 +138,112 @@ impl Recorder {
             versions,
             populated_cells: 0,
             imbalance: 1.0,
-        })
+            checkpointer,
+            resumed: None,
+            earlier_seconds: 0.0,
+            seconds: 0.0,
+        };
+        if let Some(Resume { state, .. }) = resume {
+            recorder.restore(&state)?;
+            recorder.resumed = Some(state);
+        }
+        Ok(recorder)
+    }
+
+    /// What the time loop saved with [`Self::end_step`] before the run was interrupted; `None`
+    /// in a run that starts at the beginning.
+    pub fn resumed(&self) -> Option<&RunState> {
+        self.resumed.as_ref()
+    }
+
+    /// The last thing in a step, when points, mesh and partition are what the next step starts
+    /// from: writes a checkpoint if one is due, with the loop's own `state`. If a signal asks the
+    /// run to stop, says how it ends. Collective.
+    pub fn end_step<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        moment: Moment,
+        state: RunState,
+    ) -> Result<Option<Ending>> {
+        let (due, signal) = self.checkpointer.due(world, self.steps_completed, moment);
+        if due || signal.is_some() {
+            self.checkpoint(world, model, points, state)?;
+        }
+        Ok(signal.filter(|_| moment != Moment::End).map(|signal| Ending {
+            status: Status::Stopped,
+            on_request: true,
+            reason: format!(
+                "{} asked the run to stop after step {} of {}; a checkpoint was written: go on \
+                 with --restart last",
+                signal.name(),
+                self.steps_completed,
+                self.steps.map_or("?".to_string(), |steps| steps.to_string())
+            ),
+        }))
+    }
+
+    /// A run that cannot go on leaves its last good state, if its deck plans checkpoints: with
+    /// other settings it may go on from there.
+    pub fn keep_last_state<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        state: RunState,
+    ) -> Result<()> {
+        if self.checkpointer.planned() {
+            self.checkpoint(world, model, points, state)?;
+        }
+        Ok(())
+    }
+
+    fn checkpoint<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        mut state: RunState,
+    ) -> Result<()> {
+        self.save(&mut state);
+        let step = self.steps_completed;
+        let path = self.checkpointer.write(world, step, model, points, &state)?;
+        self.log.note(&format!("checkpoint: {}", path.display()));
+        Ok(())
+    }
+
+    fn save(&self, state: &mut RunState) {
+        for (name, value) in [
+            ("recorder.steps", self.steps_completed),
+            ("recorder.history_rows", self.history.rows()),
+            ("recorder.residual_rows", self.residuals.rows()),
+            ("recorder.newton_total", self.newton.total),
+            ("recorder.newton_max", self.newton.max),
+            ("recorder.linear_total", self.linear.total),
+            ("recorder.linear_max", self.linear.max),
+            ("recorder.populated_cells", self.populated_cells),
+        ] {
+            state.set_count(name, value as u64);
+        }
+        state.set("recorder.last_frame", self.last_frame);
+        state.set("recorder.imbalance", self.imbalance);
+        state.set("recorder.seconds", self.seconds);
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        let count = |name: &str| state.count(name).map(|n| n as usize);
+        self.steps_completed = count("recorder.steps")?;
+        self.newton =
+            Count { total: count("recorder.newton_total")?, max: count("recorder.newton_max")? };
+        self.linear =
+            Count { total: count("recorder.linear_total")?, max: count("recorder.linear_max")? };
+        self.populated_cells = count("recorder.populated_cells")?;
+        self.last_frame = state.number("recorder.last_frame")?;
+        self.imbalance = state.number("recorder.imbalance")?;
+        self.earlier_seconds = state.number("recorder.seconds")?;
+        self.seconds = self.earlier_seconds;
+        Ok(())
     }
 
     pub fn directory(&self) -> PathBuf {
@@ -94,7 +252,9 @@ impl Recorder {
 
     /// Records one accepted step (or part of one): a row and a line.
     pub fn step(&mut self, world: &World, row: &HistoryRow, with_newton: bool) -> Result<()> {
-        self.history.push(row, world.comm())?;
+        self.seconds = self.earlier_seconds + row.wall_seconds;
+        let whole_run = HistoryRow { wall_seconds: self.seconds, ..row.clone() };
+        self.history.push(&whole_run, world.comm())?;
         self.reached = (row.load_factor, row.time);
         self.populated_cells = row.populated_cells;
         self.imbalance = row.imbalance;

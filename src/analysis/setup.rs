@@ -1,4 +1,5 @@
-//! From a checked deck to points on their ranks: seed, partition, migrate, place point forces.
+//! From a checked deck to points on their ranks: seed, partition, migrate, place point forces;
+//! or the same from a checkpoint.
 
 use crate::assembly::manufactured::Manufactured;
 use crate::deck::Deck;
@@ -7,6 +8,7 @@ use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
 use crate::material::Material;
+use crate::output::checkpoint::Restored;
 use crate::parallel::{self, Partition, World};
 use crate::points::Points;
 use crate::points::seed::{self, Share};
@@ -22,7 +24,38 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     let partition = Partition::build(world, &grid, deck.parallel.brick, &points, None)?;
     parallel::migrate(world, &partition, &grid, &mut points)?;
     place_point_forces(world, &deck, &mut points)?;
+    Ok((model_of(deck, grid, partition)?, points))
+}
 
+/// The model and this rank's points as a checkpoint holds them: the stored partition where it
+/// fits this run, a new one otherwise. Collective.
+pub fn restore<const D: usize>(
+    world: &World,
+    deck: Deck,
+    restored: Restored<D>,
+) -> Result<(Model<D>, Points<D>)> {
+    let mut grid = world.fail_together(build_grid(&deck))?;
+    let Restored { ranks, mut points, mesh_positions, brick, owners, .. } = restored;
+    if let (Grid::Mesh(mesh), Some(positions)) = (&mut grid, mesh_positions) {
+        world.fail_together(mesh.set_positions(positions))?;
+    }
+    let unchanged = ranks == world.size() && (deck.parallel.brick.is_none_or(|b| Some(b) == brick));
+    let stored = unchanged.then(|| Partition::restore(&grid, brick, owners, ranks)).flatten();
+    let partition = match stored {
+        Some(partition) => partition,
+        None => Partition::build(world, &grid, deck.parallel.brick, &points, None)?,
+    };
+    // With the stored partition nothing moves; the points are in the order of their cells.
+    parallel::migrate(world, &partition, &grid, &mut points)?;
+    Ok((model_of(deck, grid, partition)?, points))
+}
+
+/// Materials and everything else that follows from the deck alone.
+fn model_of<const D: usize>(
+    deck: Deck,
+    grid: Grid<D>,
+    partition: Partition<D>,
+) -> Result<Model<D>> {
     let materials = deck
         .bodies
         .iter()
@@ -43,7 +76,7 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
         _ => None,
     });
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
-    Ok((Model { deck, grid, partition, materials, penalties, manufactured }, points))
+    Ok(Model { deck, grid, partition, materials, penalties, manufactured })
 }
 
 fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {

@@ -2,6 +2,8 @@
 
 use crate::assembly::conditions::StepSpan;
 use crate::deck::model::OnFailure;
+use crate::error::{Error, Result};
+use crate::output::RunState;
 
 /// The position in the analysis, counted in ticks so that halving and doubling are exact.
 #[derive(Debug, Clone)]
@@ -33,9 +35,23 @@ impl Stepping {
         }
     }
 
-    /// Continues behind `completed` finished steps.
-    pub fn resume(&mut self, completed: usize) {
-        self.position = completed as u64 * self.ticks_per_step;
+    /// Puts the position into a checkpoint.
+    pub fn save(&self, state: &mut RunState) {
+        state.set_count("stepping.ticks_per_step", self.ticks_per_step);
+        state.set_count("stepping.position", self.position);
+        state.set_count("stepping.size", self.size);
+        state.set_count("stepping.cuts", self.cuts as u64);
+    }
+
+    /// Takes the position out of a checkpoint. Error: it was counted in other ticks.
+    pub fn restore(&mut self, state: &RunState) -> Result<()> {
+        if state.count("stepping.ticks_per_step")? != self.ticks_per_step {
+            return Err(Error::File("the checkpoint has another analysis.smallest_step".into()));
+        }
+        self.position = state.count("stepping.position")?;
+        self.size = state.count("stepping.size")?;
+        self.cuts = state.count("stepping.cuts")? as usize;
+        Ok(())
     }
 
     /// The next step, `None` when the analysis is complete.
@@ -121,6 +137,26 @@ mod tests {
         // Quarter, quarter, half; then whole steps again.
         assert_eq!(ends, [1.0, 2.0, 4.0, 8.0, 12.0, 16.0]);
         assert_eq!(stepping.cuts, 2);
+    }
+
+    #[test]
+    fn a_restored_position_goes_on_in_the_same_steps() {
+        let mut stepping = stepping();
+        stepping.accept();
+        assert!(stepping.refuse() && stepping.refuse());
+        stepping.accept();
+        let mut state = RunState::new();
+        stepping.save(&mut state);
+        let mut other = self::stepping();
+        other.restore(&state).unwrap();
+        assert_eq!((other.cuts, other.completed(), other.step_number()), (2, 1, 2));
+        while let Some(span) = stepping.next_span() {
+            assert_eq!(other.next_span(), Some(span));
+            assert_eq!(other.accept(), stepping.accept());
+        }
+        assert_eq!(other.next_span(), None);
+        let mut coarse = Stepping::new(4, 8.0, OnFailure::Cut, 0.5);
+        assert_eq!(coarse.restore(&state).unwrap_err().exit_code(), 3);
     }
 
     #[test]

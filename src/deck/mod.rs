@@ -9,12 +9,14 @@
 //! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |
 //! | `sections/` | each section's values and the checks across sections |
 //! | `resolved.rs` | the deck with every default, as TOML |
+//! | `physics.rs` | the part that a continued run must share |
 //! | `reference.rs` | the schema as documentation |
 //! | `expression/`, `shape.rs` | formulas; regions of space |
 
 pub mod expression;
 pub mod fields;
 pub mod model;
+pub mod physics;
 mod problems;
 mod reader;
 pub mod reference;

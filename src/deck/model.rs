@@ -88,7 +88,7 @@ pub struct Method {
     /// `velocity_update = "xpic"` with `xpic_order = m`; `None` otherwise.
     pub xpic: Option<usize>,
     /// A node whose summed basis weight is below this fraction of the largest one is held at
-    /// zero and left out of the residual (default 1e-12 without Ghost stiffness, 0 with it).
+    /// zero and left out of the residual (default 1e-8 without Ghost stiffness, 0 with it).
     pub drop_below: f64,
 }
 

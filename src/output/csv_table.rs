@@ -15,6 +15,7 @@ use crate::error::{Error, Result};
 pub struct CsvTable {
     path: PathBuf,
     columns: usize,
+    rows: usize,
     /// Open on rank 0 only.
     file: Option<File>,
 }
@@ -27,18 +28,18 @@ impl CsvTable {
             file = Some(open_to_append(path)?);
             Ok(())
         })?;
-        Ok(Self { path: path.to_path_buf(), columns: header.len(), file })
+        Ok(Self { path: path.to_path_buf(), columns: header.len(), rows: 0, file })
     }
 
-    /// Continues a table after `last_step`: later rows, and a row cut short, are dropped. A
-    /// missing file is begun anew.
+    /// Continues a table after its first `rows` rows: later ones, and a row cut short, are
+    /// dropped. A missing file is begun anew.
     ///
     /// # Errors
     /// `File` if the file has other columns.
     pub fn resume(
         path: &Path,
         header: &[String],
-        last_step: usize,
+        rows: usize,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let mut file = None;
@@ -49,11 +50,16 @@ impl CsvTable {
             } else {
                 header.clone()
             };
-            write_whole(path, rows_until(path, &text, &header, last_step)?.as_bytes())?;
+            write_whole(path, rows_until(path, &text, &header, rows)?.as_bytes())?;
             file = Some(open_to_append(path)?);
             Ok(())
         })?;
-        Ok(Self { path: path.to_path_buf(), columns: header.len(), file })
+        Ok(Self { path: path.to_path_buf(), columns: header.len(), rows, file })
+    }
+
+    /// Rows of the whole run so far, those of its earlier parts included.
+    pub fn rows(&self) -> usize {
+        self.rows
     }
 
     /// Appends a row in one write, so that a reader never meets half a number.
@@ -70,6 +76,7 @@ impl CsvTable {
             text.push_str(&words.join(","));
             text.push('\n');
         }
+        self.rows += rows.len();
         on_root(comm, || match &mut self.file {
             Some(file) => {
                 file.write_all(text.as_bytes()).map_err(|reason| cannot_write(&self.path, &reason))
@@ -107,7 +114,7 @@ fn line(words: &[String]) -> Result<String> {
     text.map_err(|reason| Error::File(format!("cannot compose a csv header: {reason}")))
 }
 
-fn rows_until(path: &Path, text: &str, header: &str, last_step: usize) -> Result<String> {
+fn rows_until(path: &Path, text: &str, header: &str, rows: usize) -> Result<String> {
     let mut lines = text.split_inclusive('\n');
     let found = lines.next().unwrap_or_default();
     if found != header {
@@ -118,10 +125,7 @@ fn rows_until(path: &Path, text: &str, header: &str, last_step: usize) -> Result
             header.trim_end()
         )));
     }
-    let kept = lines.filter(|row| {
-        let step = row.split(',').next().and_then(|word| word.trim().parse::<f64>().ok());
-        row.ends_with('\n') && step.is_some_and(|step| step <= last_step as f64)
-    });
+    let kept = lines.take(rows).filter(|row| row.ends_with('\n'));
     Ok(std::iter::once(found).chain(kept).collect())
 }
 
@@ -147,7 +151,7 @@ mod tests {
     fn a_restart_drops_later_and_broken_rows() {
         let path = Path::new("history.csv");
         let text = "step [-],x [m]\n1,0.5\n2,0.6\n3,0.7\n4,0";
-        let kept = |last| rows_until(path, text, "step [-],x [m]\n", last).unwrap();
+        let kept = |rows| rows_until(path, text, "step [-],x [m]\n", rows).unwrap();
         assert_eq!(kept(2), "step [-],x [m]\n1,0.5\n2,0.6\n");
         assert_eq!(kept(9), "step [-],x [m]\n1,0.5\n2,0.6\n3,0.7\n");
         assert_eq!(kept(0), "step [-],x [m]\n");

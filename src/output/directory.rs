@@ -17,6 +17,9 @@ pub const LOG: &str = "log.txt";
 pub const DECK: &str = "input.toml";
 pub const RESOLVED_DECK: &str = "resolved.toml";
 
+/// Ending of a checkpoint that a restart from an earlier one has made void.
+pub const SUPERSEDED: &str = ".superseded";
+
 /// All names that a run may leave, apart from the numbered ones.
 const NAMES: [&str; 9] = [
     SUMMARY,
@@ -122,7 +125,7 @@ fn results_in(path: &Path) -> Result<Vec<String>> {
 }
 
 fn is_ours(name: &str) -> bool {
-    let name = name.strip_suffix(PARTIAL).unwrap_or(name);
+    let name = name.strip_suffix(PARTIAL).or(name.strip_suffix(SUPERSEDED)).unwrap_or(name);
     NAMES.contains(&name)
         || NUMBERED.iter().any(|prefix| {
             name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(".h5")).is_some_and(
@@ -151,6 +154,7 @@ mod tests {
             "points-000005.h5",
             "grid-000000.h5.partial",
             "checkpoint-12.h5",
+            "checkpoint-000012.h5.superseded",
             "points.xdmf.partial",
         ] {
             assert!(is_ours(name), "{name}");

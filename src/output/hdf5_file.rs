@@ -146,6 +146,12 @@ impl<'c> ParallelFile<'c> {
         Ok(values)
     }
 
+    /// Reads all rows on every rank.
+    pub fn read_all<T: H5Type + Clone + Default>(&self, name: &str) -> Result<Vec<T>> {
+        let total = self.shape(name)?.0;
+        self.read_rows(name, 0, total)
+    }
+
     /// Reads the rows `total * rank / size .. total * (rank + 1) / size`: an equal share.
     pub fn read_share<T: H5Type + Clone + Default>(&self, name: &str) -> Result<Vec<T>> {
         let total = self.shape(name)?.0;
@@ -192,12 +198,17 @@ impl<'c> ParallelFile<'c> {
 
     /// Closes the file and gives it its name.
     pub fn finish(self) -> Result<()> {
+        let (path, comm) = (self.path.clone(), self.comm);
+        let partial = self.close_unnamed()?;
+        on_root(comm, || fs::rename(partial, &path).map_err(|reason| cannot_write(&path, &reason)))
+    }
+
+    /// Closes the file and leaves it under the name it has until it is whole, which is returned.
+    pub fn close_unnamed(self) -> Result<PathBuf> {
         let Self { file, path, comm } = self;
         let outcome = file.flush().and_then(|()| file.close());
         accept(comm, outcome, |reason| write_failed(&path, "", reason))?;
-        on_root(comm, || {
-            fs::rename(partial_path(&path), &path).map_err(|reason| cannot_write(&path, &reason))
-        })
+        Ok(partial_path(&path))
     }
 
     fn dataset(&self, name: &str) -> Result<hdf5::Dataset> {

@@ -159,16 +159,21 @@ impl History {
         Ok(Self { layout, table })
     }
 
-    /// Continues the history of a run that is restarted after `last_step`.
+    /// Continues the history of a run after its first `rows` rows.
     pub fn resume(
         directory: &ResultsDirectory,
         layout: Layout,
-        last_step: usize,
+        rows: usize,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let path = directory.file(HISTORY);
-        let table = CsvTable::resume(&path, &header(&layout), last_step, comm)?;
+        let table = CsvTable::resume(&path, &header(&layout), rows, comm)?;
         Ok(Self { layout, table })
+    }
+
+    /// Rows of the whole run so far.
+    pub fn rows(&self) -> usize {
+        self.table.rows()
     }
 
     /// Appends a row; it is on its way to the disk when this returns.

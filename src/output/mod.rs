@@ -9,6 +9,7 @@
 //! | `residuals.csv` | [`Residuals`] | `residuals.rs` |
 //! | `summary.json` | [`Summary`] | `summary.rs`, `extent.rs` |
 //! | `log.txt` | [`Log`] | `log.rs` |
+//! | `checkpoint-*.h5` | [`checkpoint::Checkpoint`] | `checkpoint.rs`, `run_state.rs`, `seal.rs` |
 //!
 //! | idea | file |
 //! |---|---|
@@ -24,6 +25,7 @@
 //! the same outcome, also when only one of them met the error.
 
 pub mod agreement;
+pub mod checkpoint;
 pub mod csv_table;
 pub mod directory;
 pub mod domains;
@@ -37,6 +39,8 @@ pub mod points_file;
 pub mod progress;
 pub mod report;
 pub mod residuals;
+pub mod run_state;
+pub mod seal;
 pub mod summary;
 pub mod whole_file;
 pub mod xdmf;
@@ -53,4 +57,5 @@ pub use point_field::{PointField, Quantity};
 pub use points_file::PointsSeries;
 pub use progress::Progress;
 pub use residuals::Residuals;
+pub use run_state::RunState;
 pub use summary::Summary;

@@ -89,6 +89,20 @@ pub fn plan(plan: &Plan) -> String {
     text
 }
 
+/// A run that goes on from a checkpoint.
+pub fn restart(path: &std::path::Path, step: usize, wrote: usize, ranks: usize) -> String {
+    let how = if wrote == ranks {
+        "the same as now: the run goes on bit by bit".to_string()
+    } else {
+        format!("now {ranks}: dealt out anew")
+    };
+    format!(
+        "restart: from {} after step {step}, written by {}, {how}",
+        path.display(),
+        count(wrote, "rank")
+    )
+}
+
 /// Where the time went, what it took, where the results are.
 pub fn closing(summary: &Summary, results: &std::path::Path) -> String {
     let seconds = &summary.wall_seconds;

@@ -18,14 +18,19 @@ impl Residuals {
         Ok(Self { table })
     }
 
-    /// Continues the list of a run that is restarted after `last_step`.
+    /// Continues the list of a run after its first `rows` rows.
     pub fn resume(
         directory: &ResultsDirectory,
-        last_step: usize,
+        rows: usize,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let path = directory.file(RESIDUALS);
-        Ok(Self { table: CsvTable::resume(&path, &header(), last_step, comm)? })
+        Ok(Self { table: CsvTable::resume(&path, &header(), rows, comm)? })
+    }
+
+    /// Rows of the whole run so far.
+    pub fn rows(&self) -> usize {
+        self.table.rows()
     }
 
     /// Appends the residuals of one step; the first belongs to iteration 0, at zero displacement. A step that failed

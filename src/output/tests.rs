@@ -227,7 +227,7 @@ fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
         residuals.push_step(step, &[1.0, 1e-10], comm).unwrap();
     }
     let mut history = History::resume(&directory, layout(), 2, comm).unwrap();
-    let mut residuals = Residuals::resume(&directory, 2, comm).unwrap();
+    let mut residuals = Residuals::resume(&directory, 4, comm).unwrap();
     history.push(&row(3), comm).unwrap();
     residuals.push_step(3, &[0.25], comm).unwrap();
     Summary { ranks: comm.size() as usize, ..Default::default() }.write(&directory, comm).unwrap();

@@ -110,11 +110,12 @@ impl XdmfSeries {
         on_root(comm, || {
             if path.exists() {
                 let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
-                snapshots = split_snapshots(&text)
-                    .ok_or_else(|| not_ours(path))?
-                    .into_iter()
-                    .filter(|(step, _)| *step <= last_step)
-                    .collect();
+                let all = split_snapshots(&text).ok_or_else(|| not_ours(path))?;
+                let before = all.len();
+                snapshots = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
+                if snapshots.len() < before {
+                    write_whole(path, series_xml(&snapshots).as_bytes())?;
+                }
             }
             Ok(())
         })?;

@@ -8,7 +8,7 @@ use mpi::traits::*;
 
 use crate::error::{Error, Result};
 
-use super::World;
+use super::{World, traffic};
 
 /// Longer lists travel in several messages: MPI counts bytes in 32 bits.
 const LARGEST_MESSAGE: usize = 1 << 30;
@@ -46,7 +46,7 @@ pub fn exchange_in_messages<T: Pod>(
     world.fail_together(wrong)?;
     if world.size() > 1 {
         let per_message = (largest / size_of::<T>()).max(1);
-        swap(world, &remote, per_message, &mut incoming);
+        traffic::waiting(|| swap(world, &remote, per_message, &mut incoming));
     }
     incoming.retain(|(_, list)| !list.is_empty());
     incoming.sort_by_key(|(source, _)| *source);
@@ -77,6 +77,7 @@ fn swap<T: Pod>(
             .flat_map(|(rank, list)| list.chunks(per_message).map(|piece| (*rank, piece)))
             .map(|(rank, piece)| {
                 let bytes: &[u8] = bytemuck::cast_slice(piece);
+                traffic::count_message(bytes.len());
                 comm.process_at_rank(rank as i32)
                     .immediate_synchronous_send_with_tag(scope, bytes, tag)
             })

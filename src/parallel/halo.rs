@@ -4,7 +4,7 @@ use mpi::traits::*;
 
 use crate::error::{Error, Result};
 
-use super::{World, exchange};
+use super::{World, exchange, traffic};
 
 /// Who sends which values to whom. Local arrays hold the owned values first, then the ghosts in
 /// the order they were asked for (grouped by owner).
@@ -127,16 +127,20 @@ fn swap(world: &World, sends: &[(usize, Vec<f64>)], receives: Vec<(usize, &mut [
     if count == 0 {
         return;
     }
-    mpi::request::multiple_scope(count, |scope, requests| {
-        for (rank, buffer) in receives {
-            let process = comm.process_at_rank(rank as i32);
-            requests.add(process.immediate_receive_into_with_tag(scope, buffer, TAG));
-        }
-        for (rank, values) in sends {
-            let process = comm.process_at_rank(*rank as i32);
-            requests.add(process.immediate_send_with_tag(scope, &values[..], TAG));
-        }
-        let mut done = Vec::with_capacity(count);
-        requests.wait_all(&mut done);
-    });
+    sends.iter().for_each(|(_, values)| traffic::count_message(size_of_val(&values[..])));
+    let exchange = || {
+        mpi::request::multiple_scope(count, |scope, requests| {
+            for (rank, buffer) in receives {
+                let process = comm.process_at_rank(rank as i32);
+                requests.add(process.immediate_receive_into_with_tag(scope, buffer, TAG));
+            }
+            for (rank, values) in sends {
+                let process = comm.process_at_rank(*rank as i32);
+                requests.add(process.immediate_send_with_tag(scope, &values[..], TAG));
+            }
+            let mut done = Vec::with_capacity(count);
+            requests.wait_all(&mut done);
+        })
+    };
+    traffic::waiting(exchange);
 }

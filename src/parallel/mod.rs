@@ -10,6 +10,8 @@
 //! | `metis.rs` | the partitioner |
 //! | `partition.rs` | owner of each unit, cell and node |
 //! | `migrate.rs` | points to the ranks that own their cells |
+//! | `traffic.rs` | messages, bytes and reductions, counted |
+//! | `signals.rs` | SIGTERM and SIGUSR1 as a wish of all ranks |
 
 pub mod bricks;
 pub mod cells;
@@ -18,10 +20,13 @@ pub mod halo;
 pub mod metis;
 pub mod migrate;
 pub mod partition;
+pub mod signals;
+pub mod traffic;
 pub mod world;
 
 pub use exchange::exchange;
 pub use halo::HaloPlan;
 pub use migrate::migrate;
 pub use partition::Partition;
+pub use traffic::Traffic;
 pub use world::World;

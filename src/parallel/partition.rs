@@ -84,6 +84,33 @@ impl<const D: usize> Partition<D> {
         Ok(partition)
     }
 
+    /// A partition as it was: bricks of `brick` cells a side, or the cells of a mesh, with their
+    /// owners. `None` if they do not fit the grid or `ranks`.
+    pub fn restore(
+        grid: &Grid<D>,
+        brick: Option<usize>,
+        owner: Vec<u32>,
+        ranks: usize,
+    ) -> Option<Self> {
+        let units = match (grid, brick) {
+            (Grid::Lattice(lattice), Some(side)) => Units::Bricks(Bricks::new(lattice, side)),
+            (Grid::Mesh(_), None) => Units::Cells(CellGraph::of(grid)),
+            _ => return None,
+        };
+        let partition = Partition { units, owner };
+        let fits = partition.owner.len() == partition.unit_count()
+            && partition.owner.iter().all(|&rank| (rank as usize) < ranks);
+        fits.then_some(partition)
+    }
+
+    /// Cells per side of the bricks; `None` on a mesh.
+    pub fn brick(&self) -> Option<usize> {
+        match &self.units {
+            Units::Bricks(bricks) => Some(bricks.side()),
+            Units::Cells(_) => None,
+        }
+    }
+
     pub fn owner_of_cell(&self, grid: &Grid<D>, cell: usize) -> usize {
         self.owner[self.unit_of_cell(grid, cell)] as usize
     }

@@ -6,6 +6,7 @@ use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::*;
 
+use super::traffic::reducing;
 use crate::error::Result;
 
 /// All ranks of a run.
@@ -45,7 +46,7 @@ impl World {
 
     fn reduce(&self, value: f64, operation: SystemOperation) -> f64 {
         let mut result = 0.0;
-        self.comm.all_reduce_into(&value, &mut result, operation);
+        reducing(|| self.comm.all_reduce_into(&value, &mut result, operation));
         result
     }
 
@@ -64,54 +65,73 @@ impl World {
 
     pub fn min_u64(&self, value: u64) -> u64 {
         let mut result = 0u64;
-        self.comm.all_reduce_into(&value, &mut result, SystemOperation::min());
+        reducing(|| self.comm.all_reduce_into(&value, &mut result, SystemOperation::min()));
         result
     }
 
     pub fn max_usize(&self, value: usize) -> usize {
         let mut result = 0u64;
-        self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::max());
+        reducing(|| {
+            self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::max())
+        });
         result as usize
     }
 
     pub fn sum_usize(&self, value: usize) -> usize {
         let mut result = 0u64;
-        self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::sum());
+        reducing(|| {
+            self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::sum())
+        });
         result as usize
     }
 
     /// Element by element; slices of equal length on all ranks.
     pub fn sum_slice(&self, values: &[f64]) -> Vec<f64> {
         let mut result = vec![0.0; values.len()];
-        self.comm.all_reduce_into(values, &mut result[..], SystemOperation::sum());
+        reducing(|| self.comm.all_reduce_into(values, &mut result[..], SystemOperation::sum()));
+        result
+    }
+
+    /// The largest, element by element; slices of equal length without NaN.
+    pub fn max_slice(&self, values: &[f64]) -> Vec<f64> {
+        let mut result = vec![0.0; values.len()];
+        reducing(|| self.comm.all_reduce_into(values, &mut result[..], SystemOperation::max()));
         result
     }
 
     /// Sum over the lower ranks; 0 on the first.
     pub fn exclusive_sum(&self, value: usize) -> usize {
         let mut result = 0u64;
-        self.comm.exclusive_scan_into(&(value as u64), &mut result, SystemOperation::sum());
+        reducing(|| {
+            self.comm.exclusive_scan_into(&(value as u64), &mut result, SystemOperation::sum())
+        });
         if self.is_root() { 0 } else { result as usize }
     }
 
     /// True on all ranks if true on any.
     pub fn any(&self, value: bool) -> bool {
         let mut result = 0i32;
-        self.comm.all_reduce_into(&i32::from(value), &mut result, SystemOperation::max());
+        reducing(|| {
+            self.comm.all_reduce_into(&i32::from(value), &mut result, SystemOperation::max())
+        });
         result != 0
     }
 
     pub fn barrier(&self) {
-        self.comm.barrier();
+        reducing(|| self.comm.barrier());
     }
 
     /// The bytes of `root`, on all ranks.
     pub fn broadcast_bytes(&self, root: usize, bytes: &mut Vec<u8>) {
         let mut length = bytes.len() as u64;
         let process = self.comm.process_at_rank(root as i32);
-        process.broadcast_into(&mut length);
+        reducing(|| process.broadcast_into(&mut length));
         bytes.resize(length as usize, 0);
-        process.broadcast_into(&mut bytes[..]);
+        if length == 0 {
+            // MPI does not take the pointer of an empty list.
+            return;
+        }
+        reducing(|| process.broadcast_into(&mut bytes[..]));
     }
 
     /// The message of the lowest rank that has one, on all ranks.
@@ -131,6 +151,6 @@ impl World {
     /// Fails on all ranks, with the error of the lowest failing rank, if it failed on any: call
     /// it before the next collective operation so that nobody waits for a rank that is gone.
     pub fn fail_together<T>(&self, outcome: Result<T>) -> Result<T> {
-        crate::petsc::agree(&self.comm, outcome)
+        reducing(|| crate::petsc::agree(&self.comm, outcome))
     }
 }

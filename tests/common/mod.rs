@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod run;
+pub mod validation;
 
 use std::ffi::OsStr;
 use std::process::{Command, Output, Stdio};
@@ -11,6 +12,15 @@ use mpi::environment::Universe;
 
 /// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
 const TIME_LIMIT: &str = "120";
+/// More ranks than cores, none bound, and waiting ranks give way; root is welcome.
+pub const OPEN_MPI: [(&str, &str); 6] = [
+    ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
+    ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
+    ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
+    ("OMPI_MCA_hwloc_base_binding_policy", "none"),
+    ("OMPI_MCA_mpi_yield_when_idle", "1"),
+    ("OMP_NUM_THREADS", "1"),
+];
 /// Set in the ranks of [`on_ranks`].
 const INSIDE: &str = "MPM_PAR_TEST_RANK";
 static ONE_JOB: Mutex<()> = Mutex::new(());
@@ -20,15 +30,10 @@ pub fn mpirun<S: AsRef<OsStr>>(n: usize, command: &[S], env: &[(&str, &str)]) ->
     let _alone = ONE_JOB.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let mut job = Command::new("mpirun");
     job.args(["-n", &n.to_string(), "--timeout", TIME_LIMIT]).args(command).stdin(Stdio::null());
-    for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] {
-        job.env(name, "1");
+    for (name, value) in OPEN_MPI {
+        job.env(name, value);
     }
-    // More ranks than cores, none bound, and waiting ranks give way.
-    job.env("OMPI_MCA_rmaps_base_oversubscribe", "1")
-        .env("OMPI_MCA_hwloc_base_binding_policy", "none")
-        .env("OMPI_MCA_mpi_yield_when_idle", "1")
-        .env("OMP_NUM_THREADS", "1")
-        .env_remove("PETSC_OPTIONS");
+    job.env_remove("PETSC_OPTIONS");
     job.envs(env.iter().copied());
     job.output().expect("mpirun is on the PATH")
 }

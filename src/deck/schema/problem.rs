@@ -90,7 +90,7 @@ pub const SECTIONS: &[Section] = &[
                 Default("\"flip\""), "How points take their velocity from the grid (explicit)."),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
                 "Order m of XPIC(m).").range(at_least(1.0)),
-            key("drop_below", Number, Optional("1e-12 without Ghost stiffness, 0 with it and in explicit runs"),
+            key("drop_below", Number, Optional("1e-8 without Ghost stiffness, 0 with it and in explicit runs"),
                 "Nodes whose summed basis weight is below this fraction of the largest are held at zero.")
                 .range(between(0.0, 1.0)),
         ],

@@ -134,7 +134,7 @@ pub fn method(
         stress_update: stress_update?,
         flip,
         xpic: xpic.then(|| order.unwrap_or(2)),
-        drop_below: drop_below?.unwrap_or(if keeps_all { 0.0 } else { 1e-12 }),
+        drop_below: drop_below?.unwrap_or(if keeps_all { 0.0 } else { 1e-8 }),
     })
 }
 

@@ -1,0 +1,90 @@
+//! The part of a deck that a continued run must share with the run it continues.
+//!
+//! Left out: title, output, verify, parallel, PETSc options, and how hard the solver tries
+//! (tolerance, iterations, what happens on failure): these may change between the parts of a run.
+
+use super::model::{BodySource, Deck, Every, Grid, MeshSource, OnFailure, Output};
+use super::resolved::resolved;
+
+/// The resolved deck without what may change. Files are named without their folder, so that a
+/// deck may move.
+pub fn physics(deck: &Deck) -> String {
+    let mut deck = deck.clone();
+    deck.title.clear();
+    deck.verify.clear();
+    deck.petsc.clear();
+    deck.output = Output { every: Every::Steps(1), fields: Vec::new(), checkpoint: None };
+    deck.analysis.tolerance = 0.0;
+    deck.analysis.max_iterations = 0;
+    deck.analysis.on_failure = OnFailure::Stop;
+    deck.analysis.inverted_iterates = super::model::InvertedIterates::Reject;
+    let name_only = |path: &mut std::path::PathBuf| {
+        if let Some(name) = path.file_name() {
+            *path = name.into();
+        }
+    };
+    if let Grid::Mesh(mesh) = &mut deck.grid
+        && let MeshSource::File(path) = &mut mesh.source
+    {
+        name_only(path);
+    }
+    for body in &mut deck.bodies {
+        if let BodySource::File(path) = &mut body.source {
+            name_only(path);
+        }
+    }
+    let text = resolved(&deck);
+    // What follows [output] is about the run, not about the problem.
+    text.split("\n[output]").next().unwrap_or_default().trim().to_string()
+}
+
+/// The first lines in which two such texts differ, `(first, second)`; `None` if they are equal.
+pub fn difference(first: &str, second: &str) -> Option<(String, String)> {
+    let (mut a, mut b) = (first.lines(), second.lines());
+    loop {
+        match (a.next(), b.next()) {
+            (None, None) => return None,
+            (x, y) if x == y => {}
+            (x, y) => {
+                let line = |line: Option<&str>| line.unwrap_or("(nothing)").trim().to_string();
+                return Some((line(x), line(y)));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deck::{read, reference};
+    use std::path::Path;
+
+    fn of(sets: &[&str]) -> String {
+        let sets: Vec<String> = sets.iter().map(|set| set.to_string()).collect();
+        physics(&read(Path::new("deck.toml"), reference::EXAMPLE, &sets).unwrap())
+    }
+
+    #[test]
+    fn what_a_run_may_change_is_left_out() {
+        let same = [
+            "title=\"other\"",
+            "output.every=7",
+            "output.checkpoint={every=1}",
+            "analysis.tolerance=1e-6",
+            "analysis.on_failure=\"cut\"",
+            "parallel.brick=3",
+            "petsc.log_view=true",
+        ];
+        assert_eq!(difference(&of(&[]), &of(&same)), None);
+    }
+
+    #[test]
+    fn what_defines_the_problem_is_compared() {
+        for set in ["analysis.steps=77", "method.basis=\"mpm\"", "material.steel.young=1.5"] {
+            let (a, b) = difference(&of(&[]), &of(&[set])).expect(set);
+            assert_ne!(a, b);
+        }
+        let (_, b) = difference(&of(&[]), &of(&["analysis.steps=77"])).unwrap();
+        assert_eq!(b, "steps = 77");
+    }
+}

@@ -1,0 +1,328 @@
+//! A run that is killed, moved or stopped ends as if nothing had happened; a checkpoint that is
+//! not whole, or of another problem, is never taken.
+
+mod common;
+#[path = "common/program.rs"]
+mod program;
+
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use common::mpirun;
+use mpm_par::output::seal::Checksum;
+use program::*;
+
+const RANKS: [usize; 4] = [1, 2, 3, 4];
+
+/// Every number of ranks continues what any other wrote; on the same number bit by bit.
+#[test]
+fn any_number_of_ranks_continues_any_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = deck("restart");
+    let at = |name: String| folder.path().join(name);
+    for wrote in RANKS {
+        run_well(wrote, &deck, &at(format!("whole-{wrote}")), &[]);
+    }
+    let reference = points_of(&at("whole-1".into()).join("checkpoint-000006.h5"));
+    for wrote in RANKS {
+        let whole = at(format!("whole-{wrote}"));
+        let middle = whole.join("checkpoint-000003.h5");
+        for goes_on in RANKS {
+            let part = at(format!("part-{wrote}-{goes_on}"));
+            run_well(goes_on, &deck, &part, &["--restart", &middle.display().to_string()]);
+            let end = points_of(&part.join("checkpoint-000006.h5"));
+            let (error, field) = difference(&reference, &end);
+            assert!(error < 1e-8, "{wrote} -> {goes_on}: {field} differs by {error:e}");
+            let summaries = (summary(&whole), summary(&part));
+            assert_eq!(summaries.0["newton_iterations"], summaries.1["newton_iterations"]);
+            let rows = history(&part);
+            assert_eq!(rows.len(), 3, "a new directory holds the steps after the checkpoint");
+            if wrote == goes_on {
+                let whole_end = points_of(&whole.join("checkpoint-000006.h5"));
+                assert_eq!(difference(&whole_end, &end).0, 0.0, "{wrote} ranks: not bit by bit");
+                assert_eq!(rows[..], history(&whole)[3..]);
+            }
+        }
+    }
+}
+
+/// In its own directory a run goes on as one: tables and series are those of a run in one piece.
+#[test]
+fn a_continued_directory_is_that_of_one_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, part) = (folder.path().join("whole"), folder.path().join("part"));
+    let deck = deck("restart");
+    let often = ["--set", "output.every=1", "--set", "output.checkpoint={every=1,keep=9}"];
+    run_well(2, &deck, &whole, &often);
+    copy(&whole, &part);
+    let middle = part.join("checkpoint-000002.h5").display().to_string();
+    let words = [&often[..], &["--restart", &middle]].concat();
+    run_well(2, &deck, &part, &words);
+    let (a, b) = (contents(&whole), contents(&part));
+    assert_eq!(a.keys().collect::<Vec<_>>(), b.keys().collect::<Vec<_>>());
+    for name in ["points.xdmf", "grid.xdmf", "domains.xdmf", "residuals.csv", "resolved.toml"] {
+        assert!(a[name] == b[name], "{name} differs");
+    }
+    assert_eq!(history(&whole), history(&part));
+    assert!(column(&part, "wall_seconds").is_sorted());
+    let log = String::from_utf8_lossy(&b["log.txt"]).into_owned();
+    assert!(log.contains("checkpoint-000002.h5 after step 2, written by 2 ranks"), "{log}");
+}
+
+/// A mesh that has moved is put back where it was.
+#[test]
+fn a_moved_mesh_is_restored() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = Path::new(env!("CARGO_MANIFEST_DIR")).join("inputs/stretch.toml");
+    let whole = folder.path().join("whole");
+    let plan = ["--set", "output.checkpoint={every=8,keep=9}", "--set", "analysis.steps=16"];
+    run_well(2, &deck, &whole, &plan);
+    let middle = whole.join("checkpoint-000008.h5").display().to_string();
+    for ranks in [2, 3] {
+        let part = folder.path().join(format!("part-{ranks}"));
+        run_well(ranks, &deck, &part, &[&plan[..], &["--restart", &middle]].concat());
+        let ends = [&whole, &part].map(|out| points_of(&out.join("checkpoint-000016.h5")));
+        let (error, field) = difference(&ends[0], &ends[1]);
+        let limit = if ranks == 2 { 0.0 } else { 1e-8 };
+        assert!(error <= limit, "{ranks} ranks: {field} differs by {error:e}");
+    }
+}
+
+/// A file that is not whole is refused with exit code 3, and nothing changes; `last` falls back.
+#[test]
+fn damaged_checkpoints_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let deck = deck("restart");
+    run_well(1, &deck, &out, &["--set", "output.checkpoint={every=2,keep=9}"]);
+    let newest = out.join("checkpoint-000006.h5");
+    let good = fs::read(&newest).unwrap();
+    let size = good.len();
+    let refuse = |bytes: &[u8], what: &str| {
+        fs::write(&newest, bytes).unwrap();
+        let before = contents(&out);
+        let output = run(1, &deck, &out, &["--restart", &newest.display().to_string(), "--force"]);
+        assert_eq!(output.status.code(), Some(3), "{what}: {}", text(&output));
+        assert!(text(&output).contains("checkpoint-000006.h5 is damaged"), "{}", text(&output));
+        assert!(contents(&out) == before, "{what}: something was changed");
+    };
+    // A bit in the superblock, in a header, in the middle, in the seal; and the file cut short.
+    for place in [0, 9, 100, size / 3, size / 2, size - 50, size - 1] {
+        let mut bytes = good.clone();
+        bytes[place] ^= 0x10;
+        refuse(&bytes, &format!("bit at {place} of {size}"));
+    }
+    for length in [0, 10, size / 2, size - 48, size - 1] {
+        refuse(&good[..length], &format!("{length} of {size} bytes"));
+    }
+    refuse(&[&good[..], b"x"].concat(), "one byte more");
+
+    // The newest is damaged now: the one before it is taken, and this is said.
+    let output = run_well(1, &deck, &out, &["--restart", "last"]);
+    let said = text(&output);
+    assert!(said.contains("checkpoint-000006.h5 is damaged"), "{said}");
+    assert!(said.contains("falling back") && said.contains("after step 4"), "{said}");
+    assert_eq!(column(&out, "step"), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+    assert_eq!(fs::read(&newest).unwrap().len(), size, "written anew");
+    // None is good: an error, not a start from the beginning.
+    for step in [2, 4, 6] {
+        let path = out.join(format!("checkpoint-{step:06}.h5"));
+        fs::write(&path, &fs::read(&path).unwrap()[..1000]).unwrap();
+    }
+    let before = contents(&out);
+    let output = run(1, &deck, &out, &["--restart", "last"]);
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output));
+    assert!(text(&output).contains("no checkpoint in"), "{}", text(&output));
+    assert!(contents(&out) == before);
+}
+
+/// Another problem, another format, no file at all: exit code 3 on all of them.
+#[test]
+fn foreign_newer_and_missing_checkpoints_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let deck = deck("restart");
+    run_well(1, &deck, &out, &[]);
+    let newest = out.join("checkpoint-000006.h5").display().to_string();
+    let before = contents(&out);
+    let refuse = |more: &[&str], what: &str| {
+        for ranks in [1, 2] {
+            let output = run(ranks, &deck, &out, more);
+            assert_eq!(output.status.code(), Some(3), "{}", text(&output));
+            assert!(text(&output).contains(what), "{what}? {}", text(&output));
+        }
+        assert!(contents(&out) == before, "{what}: something was changed");
+    };
+    let foreign = ["--set", "material.clay.yield=21e3", "--restart"];
+    refuse(&[&foreign[..], &["last"]].concat(), "`yield = 20000.0");
+    refuse(&[&foreign[..], &[&newest]].concat(), "belongs to another problem");
+    let absent = folder.path().join("absent.h5").display().to_string();
+    refuse(&["--restart", &absent], "absent.h5");
+
+    let empty = folder.path().join("empty").display().to_string();
+    let output = run(1, &deck, Path::new(&empty), &["--restart", "last"]);
+    assert_eq!(output.status.code(), Some(3), "{}", text(&output));
+    assert!(!Path::new(&empty).exists(), "a refusal creates nothing");
+
+    // A format from the future, sealed as it should be.
+    let mut bytes = fs::read(&newest).unwrap();
+    let seal = bytes.len() - 48;
+    bytes[seal + 16..seal + 24].copy_from_slice(&77_u64.to_le_bytes());
+    let mut sum = Checksum::new(1);
+    sum.add_bytes(&bytes[seal..seal + 40]);
+    bytes.splice(seal + 40.., sum.finish().to_le_bytes());
+    let newer = folder.path().join("newer.h5");
+    fs::write(&newer, &bytes).unwrap();
+    refuse(&["--restart", &newer.display().to_string()], "newer version of the program (format 77");
+}
+
+/// What may change between the parts of a run may change.
+#[test]
+fn output_and_solver_settings_may_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, deck) = (folder.path().join("out"), deck("restart"));
+    run_well(1, &deck, &out, &[]);
+    let middle = out.join("checkpoint-000003.h5").display().to_string();
+    let other = folder.path().join("other");
+    let sets = [
+        "--set",
+        "analysis.tolerance=1e-6",
+        "--set",
+        "title=\"again\"",
+        "--set",
+        "parallel.brick=1",
+        "--restart",
+        &middle,
+    ];
+    run_well(1, &deck, &other, &sets);
+    assert_eq!(summary(&other)["title"], "again");
+    assert_eq!(summary(&other)["steps_completed"], 6);
+}
+
+/// SIGUSR1 and SIGTERM: a checkpoint at the end of the step, status "stopped", and on we go.
+#[test]
+fn signals_stop_a_run_in_good_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = deck("restart");
+    let slow = ["--set", "analysis.steps=400", "--set", "output.every=400"];
+    for (signal, name) in [(libc::SIGUSR1, "SIGUSR1"), (libc::SIGTERM, "SIGTERM")] {
+        let out = folder.path().join(name);
+        let mut running = Running::start(2, &deck, &out, &[&slow[..], &NEVER].concat());
+        let rows = || fs::read_to_string(out.join("history.csv")).unwrap_or_default();
+        wait_until(|| rows().lines().count() > 3);
+        // mpirun hands SIGUSR1 on to all ranks; SIGTERM goes to one rank, and all must learn.
+        let target = match signal {
+            libc::SIGUSR1 => running.0.id() as i32,
+            _ => *running.ranks().first().expect("a rank"),
+        };
+        Running::signal(target, signal);
+        let status = running.0.wait().unwrap();
+        assert_eq!(status.code(), Some(1), "stopped is not done");
+        let stopped = summary(&out);
+        assert_eq!(stopped["status"], "stopped");
+        let reason = stopped["reason"].as_str().unwrap();
+        assert!(reason.contains(name) && reason.contains("--restart last"), "{reason}");
+        let done = stopped["steps_completed"].as_u64().unwrap();
+        assert!(done < 400, "the run was over before the signal");
+        assert!(out.join(format!("checkpoint-{done:06}.h5")).exists());
+        assert_eq!(rows().lines().count() as u64, done + 1);
+        let output =
+            run_well(1, &deck, &out, &[&slow[..], &NEVER, &["--restart", "last"]].concat());
+        assert!(text(&output).contains(&format!("after step {done}")), "{}", text(&output));
+        assert_eq!(column(&out, "step"), (1..=400).map(f64::from).collect::<Vec<_>>());
+    }
+}
+
+/// Only signals write checkpoints.
+const NEVER: [&str; 2] = ["--set", "output.checkpoint={minutes=1000}"];
+
+/// kill -9 at moments that differ from run to run, during writes too: there is always a good
+/// checkpoint or none, and the end is that of a run in one piece.
+fn kill_at_random(times: u32, ranks: usize) {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = deck("restart");
+    // Nearly all the time goes into writing.
+    let busy = ["--set", "analysis.steps=150", "--set", "output.checkpoint={every=1,keep=2}"];
+    let whole = folder.path().join("whole");
+    run_well(ranks, &deck, &whole, &busy);
+    let out = folder.path().join("out");
+    let (mut killed, mut during_write, mut restarts) = (0, 0, 0);
+    let mut draw = std::process::id();
+    while killed < times {
+        let newest_before = newest(&out);
+        let start = match newest_before {
+            None => vec!["--force"],
+            Some(_) => vec!["--restart", "last"],
+        };
+        let mut running = Running::start(ranks, &deck, &out, &[&busy[..], &start].concat());
+        // From its first new checkpoint on, or early, in set-up and reading.
+        draw = draw.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if draw >> 29 != 0 {
+            wait_until(|| newest(&out) > newest_before || exited(&mut running));
+        }
+        std::thread::sleep(Duration::from_millis(u64::from(draw >> 8) % 60));
+        if exited(&mut running) {
+            // It came to its end before the blow: begin again.
+            fs::remove_dir_all(&out).unwrap();
+            continue;
+        }
+        running.kill();
+        killed += 1;
+        restarts += u32::from(newest_before.is_some());
+        let partial = |name: &String| name.starts_with("checkpoint-") && name.ends_with(".partial");
+        during_write += u32::from(out.exists() && contents(&out).keys().any(partial));
+    }
+    println!("{killed} kills, {restarts} of restarted runs, {during_write} in mid-checkpoint");
+    assert!(restarts > 0);
+    let last = if newest(&out).is_some() { ["--restart", "last"] } else { ["--force", "--force"] };
+    let last = if last[0] == "--force" { &last[..1] } else { &last[..] };
+    run_well(ranks, &deck, &out, &[&busy[..], last].concat());
+    let ends = [&whole, &out].map(|out| points_of(&out.join("checkpoint-000150.h5")));
+    let (error, field) = difference(&ends[0], &ends[1]);
+    assert_eq!(error, 0.0, "{field} differs");
+    assert_eq!(history(&whole), history(&out));
+}
+
+fn exited(running: &mut Running) -> bool {
+    running.0.try_wait().unwrap().is_some()
+}
+
+/// Step of the newest checkpoint that has its name.
+fn newest(out: &Path) -> Option<usize> {
+    let names = fs::read_dir(out).ok()?.flatten().map(|entry| entry.file_name());
+    names
+        .filter_map(|name| {
+            name.to_str()?.strip_prefix("checkpoint-")?.strip_suffix(".h5")?.parse().ok()
+        })
+        .max()
+}
+
+#[test]
+fn killed_at_any_moment_a_run_goes_on() {
+    kill_at_random(6, 2);
+}
+
+#[test]
+#[ignore = "long: 50 kills"]
+fn killed_fifty_times_a_run_goes_on() {
+    kill_at_random(25, 2);
+    kill_at_random(25, 3);
+}
+
+/// A failed step leaves the last good state, from which other settings may go on.
+#[test]
+fn a_run_that_failed_goes_on_with_other_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let (out, deck) = (folder.path().join("out"), deck("restart"));
+    let hopeless = ["--set", "analysis.max_iterations=6", "--set", "analysis.on_failure=\"stop\""];
+    let output = mpirun(2, &words(&deck, &out, &hopeless, 2), &[]);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+    let done = summary(&out)["steps_completed"].as_u64().unwrap();
+    assert!((1..6).contains(&done), "{done}");
+    run_well(2, &deck, &out, &["--restart", "last"]);
+    let (whole, reference) = (folder.path().join("whole"), "checkpoint-000006.h5");
+    run_well(2, &deck, &whole, &[]);
+    let ends = [&whole, &out].map(|out| points_of(&out.join(reference)));
+    assert_eq!(difference(&ends[0], &ends[1]).0, 0.0);
+}
