@@ -77,6 +77,8 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             key("basis", Choice(Basis::NAMES), Default("\"mpm\""),
                 "Basis functions of the points. `gimp` needs a lattice."),
+            key("control", Choice(&["off", "fem"]), Default("\"off\""),
+                "fem: the same deck by updated-Lagrangian finite elements, as a control: Gauss points for points_per_cell, basis mpm, a mesh that follows the material."),
             key("domain_update", Choice(DomainUpdate::NAMES), Default("\"corners\""),
                 "How GIMP domains follow the deformation (Lagrangian eq. 32-39)."),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::deck::model::{
-    Basis, Boundary, Element, Grid, LatticeGrid, MeshGrid, MeshMotion, MeshSource, Method, Place,
+    Basis, BodySource, Boundary, Deck, Element, Grid, LatticeGrid, MeshGrid, MeshMotion,
+    MeshSource, Method, Place, Seeding,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -205,4 +206,29 @@ pub fn check_motion(table: &Table<'_>, grid: &Grid, boundaries: &[Boundary]) -> 
             format!("no [[boundary]] with where = {{ tag = \"{tag}\" }} prescribes a rotation"),
         ))
     })
+}
+
+/// `method.control = "fem"`: finite elements are Gauss points that stay at their places in a mesh
+/// which follows the material, with the standard basis.
+pub fn make_finite_elements(table: &Table<'_>, deck: &mut Deck) -> Got<()> {
+    if table.table_or_default("method", |method| method.choice_of("control", &["off", "fem"]))? == 0 {
+        return Ok(());
+    }
+    let Grid::Mesh(mesh) = &mut deck.grid else {
+        return table.table("method", |method| {
+            let message = "control = \"fem\" needs grid.type = \"mesh\"";
+            Err(method.problem("control", message))
+        });
+    };
+    mesh.motion = MeshMotion::Material;
+    deck.method.basis = Basis::Mpm;
+    for body in &mut deck.bodies {
+        if let BodySource::Shape { seeding, .. } | BodySource::MeshCells { seeding, .. } =
+            &mut body.source
+            && let Seeding::PerCell(counts) = seeding
+        {
+            *seeding = Seeding::Gauss(counts.iter().copied().max().unwrap_or(2).min(8));
+        }
+    }
+    Ok(())
 }

@@ -64,7 +64,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     if let (Ok(analysis), Ok(boundaries)) = (&analysis, &boundaries) {
         restraint::check(&root, analysis, boundaries, dimension)?;
     }
-    Ok(Deck {
+    let mut deck = Deck {
         title: title?,
         dimension,
         directory: directory.to_path_buf(),
@@ -81,5 +81,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
         conditioning_displacement: conditioning?,
         petsc: petsc?,
         grid,
-    })
+    };
+    grid::make_finite_elements(&root, &mut deck)?;
+    Ok(deck)
 }
