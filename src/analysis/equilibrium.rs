@@ -132,6 +132,24 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self
     }
 
+    pub fn settings(&self) -> &NewtonSettings {
+        &self.settings
+    }
+
+    /// Forgets all iterates: the next evaluation is the step's first.
+    pub fn restart(&mut self) {
+        for values in [
+            &mut self.previous_owned,
+            &mut self.internal_previous,
+            &mut self.reaction_owned,
+            &mut self.internal_owned,
+        ] {
+            values.fill(0.0);
+        }
+        self.diagonal_scale = 0.0;
+        self.errors.clear();
+    }
+
     /// Nodal increments of the last evaluation, local nodes.
     pub fn displacement(&self) -> &[f64] {
         &self.displacement

@@ -4,13 +4,15 @@
 use crate::error::Result;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
+use crate::petsc::snes::NewtonOutcome;
+use crate::petsc::{Matrix, Vector};
 use crate::points::Points;
 
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, NewtonSettings};
 use super::recorder::Recorder;
-use super::solver;
+use super::solver::{self, Linear};
 
 /// A converged step. Vectors without other mention hold the owned degrees of freedom.
 pub struct Converged {
@@ -53,15 +55,24 @@ pub fn solve<const D: usize>(
     number: usize,
 ) -> Result<std::result::Result<Converged, String>> {
     let numbering = &mesh.numbering;
-    let most = model.deck.analysis.max_iterations;
-    let mut snes = solver::newton::<D>(world, numbering.total * D, most)?;
     let mut matrix = clock.time(Phase::Assemble, || {
         let values = vec![0.0; mesh.pattern.ghost_start * D * D];
         solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
     })?;
     let mut solution = matrix.vector()?;
     let before = clock.elapsed();
-    let outcome = snes.solve(&mut problem, &mut matrix, &mut solution)?;
+    let stabilised = model.penalties.iter().all(|penalty| penalty.stiffness > 0.0);
+    let (outcome, used) = solve_robustly(
+        world,
+        &mut problem,
+        stabilised,
+        numbering.total * D,
+        &mut matrix,
+        &mut solution,
+    )?;
+    if let Some(solver) = used {
+        recorder.log.say(&format!("step {number}: multigrid failed; solved again with {solver}"));
+    }
     let assembled = problem.assembly_seconds;
     clock.add(Phase::Assemble, assembled);
     clock.add(Phase::Solve, clock.elapsed() - before - assembled);
@@ -83,4 +94,33 @@ pub fn solve<const D: usize>(
         evaluations: problem.errors.len(),
         linear_iterations: outcome.linear_iterations_total,
     }))
+}
+
+/// Newton's method with the default solver; where that fails, once more from the start with the
+/// next stronger one, which is named. Collective.
+fn solve_robustly<const D: usize>(
+    world: &World,
+    problem: &mut Equilibrium<'_, D>,
+    stabilised: bool,
+    equations: usize,
+    matrix: &mut Matrix,
+    solution: &mut Vector,
+) -> Result<(NewtonOutcome, Option<String>)> {
+    let linear = Linear::of::<D>(equations, stabilised);
+    let most = problem.settings().max_evaluations;
+    let mut snes = solver::newton(world, linear, most)?;
+    let outcome = snes.solve(problem, matrix, solution)?;
+    let Some(stronger) = linear.stronger::<D>(equations).filter(|_| outcome.linear_failure) else {
+        return Ok((outcome, None));
+    };
+    let before = snes.ksp()?.describe()?;
+    let mut snes = solver::newton(world, stronger, most)?;
+    let after = snes.ksp()?.describe()?;
+    if before == after {
+        // The user's options chose both.
+        return Ok((outcome, None));
+    }
+    problem.restart();
+    solution.values_mut()?.fill(0.0);
+    Ok((snes.solve(problem, matrix, solution)?, Some(after)))
 }

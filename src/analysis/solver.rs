@@ -1,5 +1,10 @@
-//! Which linear solver a system gets by default: direct while it is small, multigrid beyond.
+//! Which linear solver a system gets by default: direct while that is cheap, multigrid beyond.
 //! The user's PETSc options with the prefix `-qs_` win over all of it.
+//!
+//! The limits come from measurements (docs/performance.md). Ghost stiffness bounds the condition
+//! number, and multigrid wins early; without it multigrid may fail at any size, and a direct
+//! solver is kept for as long as memory allows. A parallel direct solver sums in the order in
+//! which messages arrive; on one rank it repeats bit by bit, and is faster at these sizes too.
 
 use crate::assembly::{Numbering, Pattern};
 use crate::error::Result;
@@ -8,32 +13,88 @@ use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
 
-/// Equations above which multigrid beats the direct solver: fill grows much faster in 3D.
-const DIRECT_BELOW: [usize; 2] = [150_000, 20_000];
+/// Equations up to which the direct solver is the default in 2D and 3D, with Ghost stiffness.
+const DIRECT_STABILISED: [usize; 2] = [20_000, 6_000];
+/// Without Ghost stiffness.
+const DIRECT_UNSTABILISED: [usize; 2] = [400_000, 60_000];
+/// Up to here the direct solver runs on one rank.
+const ONE_RANK: [usize; 2] = [150_000, 30_000];
 
-/// Newton's method with defaults for a system of this size.
-pub fn newton<const D: usize>(
-    world: &World,
-    equations: usize,
-    max_evaluations: usize,
-) -> Result<Snes> {
-    let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
-    if equations <= DIRECT_BELOW[usize::from(D == 3)] {
-        snes.set_defaults(&[
-            ("ksp_type", "preonly"),
-            ("pc_type", "lu"),
-            ("pc_factor_mat_solver_type", "mumps"),
-        ])?;
-    } else {
-        snes.set_defaults(&[
-            ("ksp_type", "cg"),
-            ("ksp_rtol", "1e-8"),
-            ("pc_type", "gamg"),
-            ("pc_gamg_threshold", "0.02"),
-            ("mg_levels_ksp_type", "chebyshev"),
-            ("mg_levels_pc_type", "jacobi"),
-        ])?;
+/// The built-in solvers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linear {
+    /// MUMPS on one of the ranks.
+    DirectOnOne,
+    /// MUMPS on all ranks.
+    Direct,
+    /// Conjugate gradients with smoothed aggregation and the rigid-body modes.
+    Multigrid,
+}
+
+impl Linear {
+    /// The default for a system of `equations` in `D` dimensions; `stabilised`: every body has
+    /// Ghost stiffness.
+    pub fn of<const D: usize>(equations: usize, stabilised: bool) -> Self {
+        let at = usize::from(D == 3);
+        let direct = if stabilised { DIRECT_STABILISED[at] } else { DIRECT_UNSTABILISED[at] };
+        if equations > direct { Linear::Multigrid } else { Self::direct::<D>(equations) }
     }
+
+    /// What to try when this one cannot solve a system; `None` for a direct solver.
+    pub fn stronger<const D: usize>(self, equations: usize) -> Option<Self> {
+        (self == Linear::Multigrid).then(|| Self::direct::<D>(equations))
+    }
+
+    fn direct<const D: usize>(equations: usize) -> Self {
+        let one = equations <= ONE_RANK[usize::from(D == 3)];
+        if one { Linear::DirectOnOne } else { Linear::Direct }
+    }
+
+    /// Options without the prefix, on `ranks` ranks.
+    pub fn options(self, ranks: usize) -> Vec<(&'static str, String)> {
+        const PACKAGE: &str = "mumps";
+        let list: &[(&str, &str)] = match self {
+            Linear::DirectOnOne if ranks > 1 => &[
+                ("ksp_type", "preonly"),
+                ("pc_type", "telescope"),
+                ("telescope_ksp_type", "preonly"),
+                ("telescope_pc_type", "lu"),
+                ("telescope_pc_factor_mat_solver_type", PACKAGE),
+                ("snes_lag_preconditioner", "1"),
+            ],
+            Linear::DirectOnOne | Linear::Direct => &[
+                ("ksp_type", "preonly"),
+                ("pc_type", "lu"),
+                ("pc_factor_mat_solver_type", PACKAGE),
+                ("snes_lag_preconditioner", "1"),
+            ],
+            // Point Jacobi takes the rows without entries that coarse levels have where an
+            // aggregate holds fewer nodes than there are rigid-body modes; SOR does not. The
+            // first iterate's hierarchy serves the whole step.
+            Linear::Multigrid => &[
+                ("ksp_type", "cg"),
+                ("ksp_rtol", "1e-8"),
+                ("ksp_max_it", "1000"),
+                ("pc_type", "gamg"),
+                ("pc_gamg_threshold", "0.02"),
+                ("mg_levels_ksp_type", "chebyshev"),
+                ("mg_levels_pc_type", "jacobi"),
+                ("snes_lag_preconditioner", "1000"),
+            ],
+        };
+        let mut options: Vec<_> =
+            list.iter().map(|(name, value)| (*name, (*value).to_string())).collect();
+        if self == Linear::DirectOnOne && ranks > 1 {
+            options.push(("pc_telescope_reduction_factor", ranks.to_string()));
+        }
+        options
+    }
+}
+
+/// Newton's method with a built-in linear solver.
+pub fn newton(world: &World, linear: Linear, max_evaluations: usize) -> Result<Snes> {
+    let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
+    snes.set_defaults(&linear.options(world.size()))?;
     snes.set_from_options()?;
     Ok(snes)
 }

@@ -24,6 +24,10 @@ impl Lists {
         self.offsets.len() - 1
     }
 
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     #[inline]
     pub fn list(&self, s: usize) -> &[u32] {
         &self.items[self.offsets[s]..self.offsets[s + 1]]

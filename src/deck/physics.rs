@@ -80,7 +80,7 @@ mod tests {
 
     #[test]
     fn what_defines_the_problem_is_compared() {
-        for set in ["analysis.steps=77", "method.basis=\"mpm\"", "material.steel.young=1.5"] {
+        for set in ["analysis.steps=77", "method.basis=\"mpm\"", "material.rubber.young=1.5"] {
             let (a, b) = difference(&of(&[]), &of(&[set])).expect(set);
             assert_ne!(a, b);
         }

@@ -243,7 +243,7 @@ fn tables_survive_a_restart() {
         assert_eq!(read("input.toml"), "title = 'a'\n");
         assert_eq!(
             read("residuals.csv"),
-            "step [-],iteration [-],residual [-]\n1,1,1\n1,2,1e-10\n2,1,1\n2,2,1e-10\n3,1,2.5e-1\n"
+            "step [-],iteration [-],residual [-]\n1,0,1\n1,1,1e-10\n2,0,1\n2,1,1e-10\n3,0,2.5e-1\n"
         );
         let mut table = csv::Reader::from_path(folder.path().join("history.csv")).unwrap();
         let header = table.headers().unwrap().clone();

@@ -127,6 +127,10 @@ impl World {
         let process = self.comm.process_at_rank(root as i32);
         reducing(|| process.broadcast_into(&mut length));
         bytes.resize(length as usize, 0);
+        if length == 0 {
+            // MPI does not take the pointer of an empty list.
+            return;
+        }
         reducing(|| process.broadcast_into(&mut bytes[..]));
     }
 

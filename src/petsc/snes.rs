@@ -57,6 +57,8 @@ pub struct NewtonOutcome {
     pub linear_iterations_total: usize,
     pub linear_iterations_max: usize,
     pub converged: bool,
+    /// It ended because a linear solve failed.
+    pub linear_failure: bool,
     /// "converged", the problem's text, or PETSc's word for the end.
     pub reason: String,
 }
@@ -184,6 +186,7 @@ impl Snes {
         petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
         petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
         let converged = reason > 0;
+        let linear_failure = !converged && reason == sys::SNES_DIVERGED_LINEAR_SOLVE;
         let reason = match (context.diverged, context.linear_failure) {
             _ if converged => "converged".to_owned(),
             // Line searches have their own word for it.
@@ -197,6 +200,7 @@ impl Snes {
             linear_iterations_total: context.linear_total,
             linear_iterations_max: context.linear_max,
             converged,
+            linear_failure,
             reason,
         })
     }

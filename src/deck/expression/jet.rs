@@ -128,6 +128,8 @@ impl Sub for Jet {
 impl Mul for Jet {
     type Output = Self;
 
+    // The product rule adds.
+    #[allow(clippy::suspicious_arithmetic_impl)]
     fn mul(self, other: Self) -> Self {
         let (a, b) = (&self, &other);
         Jet {
@@ -144,6 +146,7 @@ impl Mul for Jet {
     }
 }
 
+#[allow(clippy::suspicious_arithmetic_impl)]
 impl Div for Jet {
     type Output = Self;
 
