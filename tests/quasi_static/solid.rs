@@ -88,19 +88,19 @@ fn twisted_bar_converges_quadratically() {
 /// Beam without rollers: it bends in space, narrower where it is stretched.
 #[test]
 fn beam_free_in_depth_bends_more_than_plane_strain() {
-    let held = Run::of("beam-3d").set("analysis.steps=10").results();
+    let held = Run::of("beam-3d").set("analysis.steps=25").results();
     let free = Run::of("beam-3d")
-        .set("analysis.steps=10")
+        .set("analysis.steps=25")
         .set("grid.size=[11.0,10.0,1.0]")
         .set("grid.origin=[0.0,0.0,-0.25]")
         .set("boundary.3.where={box={min=[0,9,-0.25],max=[0,10,0.25]}}")
         .set("boundary.2.where={box={min=[0,9,-0.25],max=[0,10,0.25]}}")
         .results();
-    for step in 1..=10 {
+    for step in 1..=25 {
         assert_quadratic(&free.residuals(step), step);
     }
     let drop = |results: &Results| {
-        let points = results.points(10);
+        let points = results.points(25);
         points.component("displacement", 1).iter().fold(0.0f64, |m, v| m.min(*v))
     };
     let (held, free) = (drop(&held), drop(&free));
@@ -115,7 +115,7 @@ fn block_collapse_converges_quadratically() {
         assert_quadratic(&results.residuals(step), step);
     }
     let [x, y] = [0, 1].map(|a| results.number(&format!("bodies.block.extent_max.{a}")));
-    assert!((x - y).abs() < 1e-8 && x > 4.5, "{x} {y}");
+    assert!((x - y).abs() < 1e-8 && x > 4.2, "{x} {y}");
     let plastic = results.history("energy_plastic");
     assert!(plastic.windows(2).all(|pair| pair[1] >= pair[0]) && plastic[19] > 0.0);
     // Loads do work, the block stores a part of it and dissipates another.
