@@ -172,6 +172,16 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         };
         let start = dot(b, b, true);
         let mut size = dot(&r, &r, true);
+        // Accelerations of nearly empty nodes are no place to start from.
+        for k in 0..D {
+            if size[k] < start[k] {
+                continue;
+            }
+            size[k] = start[k];
+            for dof in (k..owned).step_by(D) {
+                (x[dof], r[dof]) = (0.0, b[dof]);
+            }
+        }
         let mut factor = [0.0; D];
         let mut iteration = 0;
         loop {
