@@ -217,6 +217,19 @@ fn solve_step<const D: usize>(
     if let Some(why) = update::reason_to_refuse(world, grid_after, points, &made) {
         return Ok(Err(why));
     }
+    let unsound = update::unsound_domain(
+        world,
+        &model.grid,
+        grid_after,
+        deck.method.basis,
+        numbering,
+        &displacement,
+        points,
+        &made,
+    );
+    if let Some(why) = unsound {
+        return Ok(Err(why));
+    }
     let work = work_of_step::<D>(
         &conditions,
         numbering,
@@ -309,7 +322,11 @@ pub fn figures<const D: usize>(
     recorder: &Recorder,
 ) -> Result<std::collections::BTreeMap<String, f64>> {
     let (factor, time) = recorder.reached;
-    verify::figures(world, &model.deck.verify, points, factor, time)
+    let mut figures = verify::figures(world, &model.deck.verify, points, factor, time)?;
+    if let Some(field) = &model.manufactured {
+        figures.extend(verify::manufactured(world, field, &model.materials, points, factor, time)?);
+    }
+    Ok(figures)
 }
 
 /// A run that failed, as the error the command line reports.

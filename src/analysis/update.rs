@@ -6,6 +6,7 @@ use nalgebra::Matrix3;
 use crate::assembly::Numbering;
 use crate::assembly::internal::{StepPoints, deformation_increment};
 use crate::basis::domain::update_domains;
+use crate::basis::{cpdi1, cpdi2};
 use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -85,6 +86,46 @@ pub fn reason_to_refuse<const D: usize>(
         break;
     }
     world.first_message(reason)
+}
+
+/// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
+/// step, if any. Collective.
+#[allow(clippy::too_many_arguments)]
+pub fn unsound_domain<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    after: &Grid<D>,
+    basis: Basis,
+    numbering: &Numbering,
+    displacement: &[f64],
+    points: &Points<D>,
+    increments: &Increments<D>,
+) -> Option<String> {
+    if !matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
+        return None;
+    }
+    let nodal = |node| nodal_displacement(numbering, displacement, node);
+    let check = |p: usize| match basis {
+        Basis::Cpdi2 => cpdi2::check_step(grid, after, points, p, &nodal),
+        _ => {
+            let (increment, moved) = (&increments.deformation[p], &increments.displacement[p]);
+            cpdi1::check_step(after, points, p, increment, moved)
+        }
+    };
+    let reason = (0..points.len()).find_map(|p| check(p).err());
+    world.first_message(reason.map(|error| error.to_string()))
+}
+
+/// m; zero where no equation lives.
+fn nodal_displacement<const D: usize>(
+    numbering: &Numbering,
+    displacement: &[f64],
+    node: usize,
+) -> [f64; D] {
+    match numbering.local(node) {
+        Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
+        None => [0.0; D],
+    }
 }
 
 /// Applies the increments: F, b_e, stress, history, domains, positions.

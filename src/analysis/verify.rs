@@ -3,8 +3,10 @@
 use std::collections::BTreeMap;
 
 use crate::assembly::external::scope_of;
+use crate::assembly::manufactured::Manufactured;
 use crate::deck::model::{Verify, VerifyNorm};
 use crate::error::Result;
+use crate::material::Material;
 use crate::output::PointField;
 use crate::parallel::World;
 use crate::points::Points;
@@ -53,4 +55,36 @@ pub fn figures<const D: usize>(
         figures.insert(entry.name.clone(), value);
     }
     Ok(figures)
+}
+
+/// Errors of a manufactured solution: |u - u_exact| and |tau - tau(F_exact)| (Kirchhoff) in the L2
+/// norm over the initial volume, over the same norm of the exact field. Collective.
+pub fn manufactured<const D: usize>(
+    world: &World,
+    field: &Manufactured,
+    materials: &[Material],
+    points: &Points<D>,
+    load_factor: f64,
+    time: f64,
+) -> Result<[(String, f64); 2]> {
+    let mut sums = [0.0; 4];
+    for p in 0..points.len() {
+        let scope = scope_of(points, p, load_factor, time);
+        let material = &materials[points.body[p] as usize];
+        let (exact, stress) = field.solution::<D>(material, &scope);
+        let volume = points.volume_initial[p];
+        for a in 0..D {
+            let found = points.position[p][a] - points.position_initial[p][a];
+            sums[0] += volume * (found - exact[a]).powi(2);
+            sums[1] += volume * exact[a].powi(2);
+        }
+        sums[2] += volume * (points.kirchhoff_stress[p] - stress).norm_squared();
+        sums[3] += volume * stress.norm_squared();
+    }
+    let sums = world.sum_slice(&sums);
+    let relative = |error: f64, scale: f64| (error / scale).sqrt();
+    Ok([
+        ("manufactured_displacement".to_string(), relative(sums[0], sums[1])),
+        ("manufactured_stress".to_string(), relative(sums[2], sums[3])),
+    ])
 }

@@ -28,6 +28,24 @@ impl Manufactured {
         Ok(Manufactured { field: field.collect::<Result<_>>()? })
     }
 
+    /// The displacement, m, and the Kirchhoff stress, Pa, of the solution at a place.
+    pub fn solution<const D: usize>(
+        &self,
+        material: &Material,
+        scope: &Scope,
+    ) -> ([f64; D], Matrix3<f64>) {
+        let jets: [Jet; D] = self.jets(scope);
+        let unstrained = Matrix3::identity();
+        let start = StepStart {
+            material,
+            deformation_gradient: &unstrained,
+            elastic_left_cauchy_green: &unstrained,
+            volume_initial: 1.0,
+        };
+        let state = mechanics::stress(&start, &deformation_gradient(&jets));
+        (jets.map(|jet| jet.value), state.kirchhoff_stress)
+    }
+
     fn jets<const D: usize>(&self, scope: &Scope) -> [Jet; D] {
         std::array::from_fn(|k| self.field[k].jet(scope))
     }

@@ -116,6 +116,25 @@ pub fn influence<const D: usize>(
     corners(points, p)?.fill(grid, points, p, row)
 }
 
+/// Whether the step leaves point `p` a sound domain inside `after`, the grid of the next step:
+/// `increment` is the step's dF and `displacement` the point's, m.
+///
+/// Errors: as of [`influence`].
+pub fn check_step<const D: usize>(
+    after: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    increment: &[[f64; D]; D],
+    displacement: &[f64; D],
+) -> Result<()> {
+    let before = half_edges(points, p);
+    let edges: [[f64; D]; D] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| (0..D).map(|k| increment[i][k] * before[k][j]).sum())
+    });
+    let centre = std::array::from_fn(|a| points.position[p][a] + displacement[a]);
+    for_each_place(after, points, p, &positions(&centre, &edges), |_, _| ())
+}
+
 /// Appends the cells that hold the corners of point `p`, ascending.
 pub fn populated_cells<const D: usize>(
     grid: &Grid<D>,

@@ -97,17 +97,27 @@ fn hexahedron<const D: usize>(x: &[[f64; D]; 8]) -> ([f64; 8], [[f64; D]; 8], f6
 /// to valid functions and is let through.
 pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D>> {
     let positions = points.corners[p];
-    let (weights, gradients, volume) = integrals(&positions);
-    if !(volume > 0.0 && volume.is_finite()) {
-        return Err(Error::Run(format!(
-            "the CPDI2 domain of point {} at {:?} m is inverted: volume {volume:e} m{D}, corners \
-             {:?}; try smaller steps, or basis cpdi1 or mpm for such distortion",
-            points.id[p],
-            points.position[p],
-            &positions[..1 << D]
-        )));
-    }
+    let (weights, gradients) = sound(points, p, &positions)?;
     Ok(Corners { positions, weights, gradients })
+}
+
+/// Weights and gradients of a domain of point `p`, if it has a volume.
+fn sound<const D: usize>(
+    points: &Points<D>,
+    p: usize,
+    positions: &[[f64; D]; 8],
+) -> Result<([f64; 8], [[f64; D]; 8])> {
+    let (weights, gradients, volume) = integrals(positions);
+    if volume > 0.0 && volume.is_finite() {
+        return Ok((weights, gradients));
+    }
+    Err(Error::Run(format!(
+        "the CPDI2 domain of point {} at {:?} m is inverted: volume {volume:e} m{D}, corners \
+         {:?}; try smaller steps, or basis cpdi1 or mpm for such distortion",
+        points.id[p],
+        points.position[p],
+        &positions[..1 << D]
+    )))
 }
 
 /// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending.
@@ -146,19 +156,44 @@ pub fn update_corners<const D: usize>(
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<()> {
     for p in 0..points.len() {
-        let mut moved = points.corners[p];
-        for_each_place(grid, points, p, &points.corners[p], |corner, at| {
-            for (&node, &n) in at.nodes.iter().zip(&at.weights).take(at.count) {
-                let u = displacement(node);
-                for (x, u) in moved[corner].iter_mut().zip(&u) {
-                    *x += n * u;
-                }
-            }
-        })?;
-        points.corners[p] = moved;
+        points.corners[p] = moved_corners(grid, points, p, displacement)?;
         corners(points, p)?;
     }
     Ok(())
+}
+
+/// Where the step takes the corners of point `p`, m. Error: a corner outside the grid.
+fn moved_corners<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    displacement: &dyn Fn(usize) -> [f64; D],
+) -> Result<[[f64; D]; 8]> {
+    let mut moved = points.corners[p];
+    for_each_place(grid, points, p, &points.corners[p], |corner, at| {
+        for (&node, &n) in at.nodes.iter().zip(&at.weights).take(at.count) {
+            let u = displacement(node);
+            for (x, u) in moved[corner].iter_mut().zip(&u) {
+                *x += n * u;
+            }
+        }
+    })?;
+    Ok(moved)
+}
+
+/// Whether the step leaves point `p` a sound domain inside `after`, the grid of the next step.
+///
+/// Errors: as of [`update_corners`], and a corner outside `after`.
+pub fn check_step<const D: usize>(
+    grid: &Grid<D>,
+    after: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    displacement: &dyn Fn(usize) -> [f64; D],
+) -> Result<()> {
+    let moved = moved_corners(grid, points, p, displacement)?;
+    sound(points, p, &moved)?;
+    for_each_place(after, points, p, &moved, |_, _| ())
 }
 
 #[cfg(test)]

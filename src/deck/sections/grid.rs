@@ -211,7 +211,8 @@ pub fn check_motion(table: &Table<'_>, grid: &Grid, boundaries: &[Boundary]) -> 
 /// `method.control = "fem"`: finite elements are Gauss points that stay at their places in a mesh
 /// which follows the material, with the standard basis.
 pub fn make_finite_elements(table: &Table<'_>, deck: &mut Deck) -> Got<()> {
-    if table.table_or_default("method", |method| method.choice_of("control", &["off", "fem"]))? == 0 {
+    if table.table_or_default("method", |method| method.choice_of("control", &["off", "fem"]))? == 0
+    {
         return Ok(());
     }
     let Grid::Mesh(mesh) = &mut deck.grid else {

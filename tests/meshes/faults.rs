@@ -1,0 +1,166 @@
+//! What is wrong with a mesh or a domain is said with file and entity, and the right exit code.
+
+use crate::common::run::Run;
+
+const DECK: &str = r#"
+title = "fault"
+[analysis]
+type = "quasi-static"
+steps = 2
+[method]
+basis = "mpm"
+[grid]
+type = "mesh"
+file = "MESH"
+[material.m]
+model = "hencky"
+young = 1.0
+poisson = 0.0
+[[body]]
+name = "block"
+material = "m"
+shape = { cells = "all" }
+[[boundary]]
+where = { tag = "base" }
+fix = ["x", "y"]
+"#;
+
+const HEADER: &str = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n1 1 \"base\"\n\
+                      $EndPhysicalNames\n$Entities\n0 1 1 0\n1 0 0 0 1 0 0 1 1 0\n\
+                      1 0 0 0 1 1 0 0 0\n$EndEntities\n";
+
+/// A file with these nodes and cells of `kind` (Gmsh's number), one line from node 1 to 2 as "base".
+fn mesh(nodes: &[[f64; 2]], kind: usize, cells: &[&[usize]]) -> String {
+    let n = nodes.len();
+    let mut text = format!("{HEADER}$Nodes\n1 {n} 1 {n}\n2 1 0 {n}\n");
+    for k in 1..=n {
+        text += &format!("{k}\n");
+    }
+    for [x, y] in nodes {
+        text += &format!("{x} {y} 0\n");
+    }
+    let count = cells.len() + 1;
+    text += &format!("$EndNodes\n$Elements\n2 {count} 1 {count}\n1 1 1 1\n1 1 2\n");
+    text += &format!("2 1 {kind} {}\n", cells.len());
+    for (k, cell) in cells.iter().enumerate() {
+        let nodes: Vec<String> = cell.iter().map(usize::to_string).collect();
+        text += &format!("{} {}\n", k + 2, nodes.join(" "));
+    }
+    text + "$EndElements\n"
+}
+
+/// Runs the deck on a mesh file; the outcome must have this exit code and these words.
+#[track_caller]
+fn refused(name: &str, contents: &str, deck: &str, code: i32, words: &[&str]) {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    std::fs::write(folder.path().join(name), contents).expect("writable");
+    let outcome = Run::text(&deck.replace("MESH", name)).attempt_in(folder);
+    let said = format!("{}\n{}", outcome.stdout, outcome.stderr);
+    assert_eq!(outcome.code, code, "{said}");
+    for word in words {
+        assert!(outcome.stderr.contains(word), "no `{word}` in:\n{said}");
+    }
+    if code == 2 {
+        assert!(!outcome.files().iter().any(|f| f.starts_with("out/")), "nothing half-written");
+    }
+}
+
+const SQUARE: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]];
+
+#[test]
+fn a_good_file_runs() {
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let text = mesh(&SQUARE, 3, &[&[1, 2, 3, 4]]);
+    std::fs::write(folder.path().join("good.msh"), text).expect("writable");
+    let outcome = Run::text(&DECK.replace("MESH", "good.msh")).attempt_in(folder);
+    assert_eq!(outcome.code, 0, "{}\n{}", outcome.stdout, outcome.stderr);
+}
+
+#[test]
+fn old_gmsh_files() {
+    let text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n0\n$EndNodes\n";
+    let words = ["old.msh", "version 2.2", "only 4.1", "gmsh", "-format msh41"];
+    refused("old.msh", text, DECK, 2, &words);
+}
+
+#[test]
+fn unknown_elements() {
+    let mut nodes = SQUARE.to_vec();
+    nodes.extend([[0.5, 0.0], [0.5, 0.5]]);
+    let text = mesh(&nodes, 9, &[&[1, 2, 3, 5, 4, 6]]);
+    refused("curved.msh", &text, DECK, 2, &["curved.msh", "element 2", "Tri6", "tri3, quad4"]);
+}
+
+#[test]
+fn inverted_and_duplicate_cells() {
+    let text = mesh(&SQUARE, 3, &[&[1, 4, 3, 2]]);
+    refused("turned.msh", &text, DECK, 2, &["turned.msh", "cell 2", "inverted", "node 1 at"]);
+    let text = mesh(&SQUARE, 3, &[&[1, 2, 3, 4], &[2, 3, 4, 1]]);
+    refused("twice.msh", &text, DECK, 2, &["twice.msh", "cell 3", "duplicate of cell 2"]);
+}
+
+#[test]
+fn hanging_nodes() {
+    let nodes = [SQUARE.as_slice(), &[[2.0, 0.0], [2.0, 1.0], [1.0, 0.5], [2.0, 0.5]]].concat();
+    let text = mesh(&nodes, 3, &[&[1, 2, 3, 4], &[2, 5, 8, 7], &[7, 8, 6, 3]]);
+    refused(
+        "hanging.msh",
+        &text,
+        DECK,
+        2,
+        &["hanging.msh", "node 7 at", "hangs on a face of cell 2"],
+    );
+}
+
+#[test]
+fn missing_tags() {
+    let text = mesh(&SQUARE, 3, &[&[1, 2, 3, 4]]);
+    let deck = DECK.replace("tag = \"base\"", "tag = \"top\"");
+    refused("square.msh", &text, &deck, 2, &["square.msh", "no tag \"top\"", "\"base\""]);
+    let deck = DECK.replace("cells = \"all\"", "cells = \"rock\"");
+    refused("square.msh", &text, &deck, 2, &["square.msh", "no tag \"rock\""]);
+}
+
+#[test]
+fn files_that_are_not_there() {
+    let words = ["absent.msh", "cannot be read"];
+    refused("other.msh", "", &DECK.replace("MESH", "absent.msh"), 2, &words);
+}
+
+#[test]
+fn gimp_on_a_mesh() {
+    let text = mesh(&SQUARE, 3, &[&[1, 2, 3, 4]]);
+    let deck = DECK.replace("\"mpm\"", "\"gimp\"");
+    refused("square.msh", &text, &deck, 2, &["gimp", "needs type = \"lattice\"", "cpdi1"]);
+}
+
+#[test]
+fn finite_elements_on_a_lattice() {
+    let outcome = Run::of("column").set("method.control=\"fem\"").attempt();
+    assert_eq!(outcome.code, 2);
+    assert!(outcome.stderr.contains("control = \"fem\" needs grid.type = \"mesh\""));
+}
+
+/// A block pulled out of a mesh that stays.
+fn pulled(basis: &str, per_cell: usize) -> (i32, String) {
+    let outcome = Run::of("stretch")
+        .set(format!("method.basis=\"{basis}\""))
+        .set(format!("body.0.points_per_cell=[{per_cell}, {per_cell}]"))
+        .set("grid.motion={ follow = [\"y\"] }")
+        .set("analysis.steps=20")
+        .attempt();
+    (outcome.code, outcome.stderr)
+}
+
+#[test]
+fn points_and_corners_that_leave_the_mesh() {
+    let (code, said) = pulled("mpm", 2);
+    assert_eq!(code, 1, "{said}");
+    assert!(said.contains("point ") && said.contains("leaves the grid"), "{said}");
+    for basis in ["cpdi1", "cpdi2"] {
+        let (code, said) = pulled(basis, 1);
+        assert_eq!(code, 1, "{said}");
+        assert!(said.contains("corner ") && said.contains("is outside the grid at"), "{said}");
+        assert!(said.contains("step ") && said.contains("point "), "{said}");
+    }
+}

@@ -1,0 +1,116 @@
+//! The same answer on one to four ranks, also where a partition cuts domains.
+
+use mpm_par::analysis::discretise::Discretisation;
+use mpm_par::analysis::setup;
+use mpm_par::basis;
+use mpm_par::deck::model::{Basis, MeshMotion};
+use mpm_par::grid::Grid;
+use mpm_par::parallel::World;
+use mpm_par::{deck, parallel};
+
+use crate::common::on_ranks;
+use crate::common::run::{Run, input, relative_difference};
+
+/// Positions and stresses after `step` on two, three and four ranks against one.
+fn assert_same(name: &str, run: &Run, step: usize) {
+    let fields = |ranks: usize| {
+        let results = run.clone().ranks(ranks).set("output.fields=[\"stress\"]").results();
+        let points = results.points(step);
+        ["position", "stress"].map(|field| points.field(field).to_vec())
+    };
+    let one = fields(1);
+    for ranks in [2, 3, 4] {
+        for (a, b) in fields(ranks).iter().zip(&one) {
+            let difference = relative_difference(a, b);
+            assert!(difference < 1e-8, "{name} on {ranks} ranks: {difference:e}");
+        }
+    }
+}
+
+const METHODS: [&str; 4] = [
+    "method.basis=\"mpm\"",
+    "method.basis=\"cpdi1\"",
+    "method.basis=\"cpdi2\"",
+    "method.control=\"fem\"",
+];
+
+#[test]
+fn moving_meshes_do_not_depend_on_the_ranks() {
+    for method in METHODS {
+        assert_same(method, &Run::of("doughnut-10").set(method), 2);
+    }
+}
+
+#[test]
+#[ignore = "long: make validate"]
+fn all_cases_do_not_depend_on_the_ranks() {
+    for method in METHODS {
+        assert_same(method, &Run::of("stretch").set(method), 20);
+        assert_same(method, &Run::of("doughnut").set(method), 16);
+        assert_same(method, &Run::of("ellipse").set(method), 16);
+    }
+    assert_same("rings", &Run::of("annulus-mms"), 10);
+    assert_same("unstructured", &Run::of("annulus-unstructured"), 10);
+    assert_same("gimp in the plane", &Run::of("mms-2d"), 2);
+    assert_same("gimp in space", &Run::of("mms-3d"), 2);
+    for method in &METHODS[..3] {
+        assert_same(method, &Run::of("mms-2d-mesh").set(*method), 2);
+        assert_same(method, &Run::of("mms-3d-mesh").set(*method), 2);
+    }
+    assert_same("finite element beam", &Run::of("beam-fem").set("analysis.steps=10"), 10);
+    let collapse = Run::of("collapse").set("method.basis=\"cpdi2\"").set("method.drop_below=1e-5");
+    assert_same("collapse", &collapse, 40);
+}
+
+/// Turned by half a cell against its domains, the partition of the mesh runs through them: rows
+/// reach corners in cells of other ranks, and stay complete.
+#[test]
+fn a_partition_may_cut_domains() {
+    const NAME: &str = "ranks::a_partition_may_cut_domains";
+    on_ranks(NAME, &[2, 3, 4], |universe| {
+        let _session = mpm_par::petsc::Session::start(universe, &[], &[]).unwrap();
+        let world = World::new(mpi::topology::Communicator::duplicate(&universe.world()));
+        for method in ["cpdi1", "cpdi2"] {
+            let path = input("doughnut");
+            let text = std::fs::read_to_string(&path).unwrap();
+            let sets = [format!("method.basis=\"{method}\"")];
+            let deck = deck::read(&path, &text, &sets).unwrap();
+            let (mut model, mut points) = setup::prepare::<2>(&world, deck).unwrap();
+            let Grid::Mesh(mesh) = &mut model.grid else { panic!("a mesh") };
+            let turn = Some(([0.0; 2], 10f64.to_radians()));
+            mesh.advance(&MeshMotion::RotateWith("inner".into()), |_| None, turn).unwrap();
+            parallel::migrate(&world, &model.partition, &model.grid, &mut points).unwrap();
+
+            let basis = if method == "cpdi1" { Basis::Cpdi1 } else { Basis::Cpdi2 };
+            let mut cut = 0;
+            for p in 0..points.len() {
+                let mut cells = Vec::new();
+                basis::populated_cells(&model.grid, basis, &points, p, &mut cells).unwrap();
+                let elsewhere = |&cell: &usize| {
+                    model.partition.owner_of_cell(&model.grid, cell) != world.rank()
+                };
+                cut += usize::from(cells.iter().any(elsewhere));
+            }
+            assert!(world.sum_usize(cut) > 0, "no domain is cut: the test shows nothing");
+
+            let step = Discretisation::new(&world, &model, &points).unwrap();
+            let owned = &step.node_weight[..step.numbering.owned];
+            let total = world.sum(owned.iter().sum());
+            let count = world.sum_usize(points.len()) as f64;
+            assert!((total / count - 1.0).abs() < 1e-12, "weights add up to one for each point");
+            // Positions of the nodes map to those of the points' domains: linear fields survive.
+            for p in 0..points.len() {
+                let mut x = [0.0; 2];
+                for entry in step.influences.row(p) {
+                    let node = model.grid.node_position(step.influences.nodes[entry]);
+                    for a in 0..2 {
+                        x[a] += step.influences.weights[entry] * node[a];
+                    }
+                }
+                for a in 0..2 {
+                    assert!((x[a] - points.position[p][a]).abs() < 1e-9, "{x:?}");
+                }
+            }
+        }
+    });
+}
