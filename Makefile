@@ -1,5 +1,5 @@
 # Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
-.PHONY: help setup build run test bench docs validate lint clean
+.PHONY: help setup build run test bench iterations docs validate lint clean
 
 RANKS ?= 2
 DECK  ?= inputs/beam.toml
@@ -9,7 +9,8 @@ help:
 	@echo "make run       install what is missing, build, run $(DECK) on $(RANKS) ranks"
 	@echo "make test      all tests"
 	@echo "make lint      format and clippy, warnings are errors"
-	@echo "make bench     measure"
+	@echo "make bench     time the parts of a step beside the machine's limits"
+	@echo "make iterations  linear iterations on a curved body: table and figure (long)"
 	@echo "make validate  the longer tests: decks with published numbers"
 	@echo "make docs      the code's own documentation"
 	@echo "make setup     install the Debian packages that are missing"
@@ -29,7 +30,11 @@ test: setup
 	cargo test --release
 
 bench: setup
-	cargo bench
+	cargo bench --bench kernels
+
+# Writes docs/figures/iterations.csv and .svg.
+iterations: setup
+	cargo bench --bench iterations
 
 # The longer tests: every deck with a published number.
 validate: setup

@@ -72,6 +72,7 @@ pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> S
 
 /// Stress and tangent in `frame` for the increment dF = 1 + d(du)/dX~ (Lagrangian eq. 7).
 /// Plane strain for D = 2: dF_zz = 1. Limits as in [`stress`].
+#[inline(always)]
 pub fn contribution<const D: usize>(
     frame: Frame,
     start: &StepStart,

@@ -11,7 +11,7 @@ use crate::tensor::dense::{Square, dot};
 use crate::tensor::spectral::logarithm_slope;
 
 /// Stress T and tangent A; `back` is H, `scale` s = V0 / V_frame.
-#[inline]
+#[inline(always)]
 pub(super) fn pull_back<const D: usize>(
     update: &Update,
     back: &Square<D>,
@@ -82,7 +82,7 @@ fn pair(a: usize, b: usize) -> usize {
     if a + b == 2 { 2 } else { a.min(b) }
 }
 
-#[inline]
+#[inline(always)]
 fn add<const D: usize>(sum: &mut Square<D>, factor: f64, n: &[f64; D], m: &[f64; D]) {
     for k in 0..D {
         for l in 0..D {
@@ -91,7 +91,7 @@ fn add<const D: usize>(sum: &mut Square<D>, factor: f64, n: &[f64; D], m: &[f64;
     }
 }
 
-#[inline]
+#[inline(always)]
 fn accumulate<const D: usize>(sum: &mut Square<D>, factor: f64, term: &Square<D>) {
     for k in 0..D {
         for l in 0..D {
