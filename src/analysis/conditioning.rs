@@ -7,12 +7,14 @@ use crate::assembly::inverse::MassInverse;
 use crate::assembly::{BlockMatrix, internal, mass};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
+use crate::output::RunState;
 use crate::output::history::{Conditioning, HistoryRow};
 use crate::parallel::{World, migrate};
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance::imbalance;
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{add_scalar, ghost_matrix};
@@ -31,8 +33,10 @@ pub fn run<const D: usize>(
 ) -> Result<Ending> {
     let steps = model.deck.analysis.steps.unwrap_or(1);
     let total = model.deck.conditioning_displacement.clone().unwrap_or_else(|| vec![0.0; D]);
-    recorder.frame(world, 0, 0.0, points)?;
-    for number in 1..=steps {
+    if recorder.resumed().is_none() {
+        recorder.frame(world, 0, 0.0, points)?;
+    }
+    for number in recorder.steps_completed + 1..=steps {
         for x in &mut points.position {
             for (x, total) in x.iter_mut().zip(&total) {
                 *x += total / steps as f64;
@@ -58,6 +62,13 @@ pub fn run<const D: usize>(
             }
             Ok(())
         })?;
+        let moment = if number == steps { Moment::End } else { Moment::Step };
+        let stop = clock.time(Phase::Output, || {
+            recorder.end_step(world, model, points, moment, RunState::new())
+        })?;
+        if let Some(ending) = stop {
+            return Ok(ending);
+        }
     }
     Ok(Ending::completed())
 }

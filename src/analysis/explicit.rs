@@ -8,12 +8,14 @@ use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::point_forces;
 use crate::deck::model::{AnalysisType, Mass, StressUpdate};
 use crate::error::{Error, Result};
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance::{self, imbalance};
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
@@ -41,7 +43,13 @@ pub fn run<const D: usize>(
     let start =
         StepSums { energies: update::energies(points, &model.materials), ..StepSums::default() };
     let mut ledger = Ledger::new(&Entry::unite(world, points, start), wave_energy);
-    recorder.frame(world, 0, 0.0, points)?;
+    match recorder.resumed() {
+        Some(state) => {
+            steps.restore(state)?;
+            ledger.restore(state)?;
+        }
+        None => recorder.frame(world, 0, 0.0, points)?,
+    }
     while let Some(span) = steps.next(limit) {
         let number = steps.number();
         let (mut solved, sums) = advance(world, model, points, clock, span)
@@ -61,9 +69,11 @@ pub fn run<const D: usize>(
                 unstabilised(model)
             )));
         }
-        clock
-            .time(Phase::Migrate, || balance::settle(world, model, points))
+        let busy = clock.busy();
+        let settled = clock
+            .time(Phase::Migrate, || balance::settle(world, model, points, busy))
             .map_err(|error| at_step(error, number, span))?;
+        row.moved_points = settled.moved;
         steps.accept(span);
         recorder.steps_completed = number;
         if steps.follows_limit() {
@@ -80,6 +90,15 @@ pub fn run<const D: usize>(
             }
             Ok(())
         })?;
+        let mut state = RunState::new();
+        steps.save(&mut state);
+        ledger.save(&mut state);
+        let moment = if last { Moment::End } else { Moment::Step };
+        let stop =
+            clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;
+        if let Some(ending) = stop {
+            return Ok(ending);
+        }
     }
     Ok(Ending::completed())
 }

@@ -11,12 +11,14 @@ use crate::assembly::external::point_forces;
 use crate::deck::model::AnalysisType;
 use crate::error::Result;
 use crate::grid::Grid;
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance::{self, imbalance};
+use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, Inertia};
@@ -48,7 +50,21 @@ pub fn run<const D: usize>(
         StepSums { energies: update::energies(points, &model.materials), ..StepSums::default() };
     let mut ledger = Ledger::new(&Entry::unite(world, points, start), wave_energy);
     let mut ghost_energy = 0.0;
-    recorder.frame(world, 0, 0.0, points)?;
+    match recorder.resumed() {
+        Some(state) => {
+            stepping.restore(state)?;
+            ledger.restore(state)?;
+            ghost_energy = state.number("totals.ghost")?;
+        }
+        None => recorder.frame(world, 0, 0.0, points)?,
+    }
+    let state_of = |stepping: &Stepping, ledger: &Ledger, ghost_energy: f64| {
+        let mut state = RunState::new();
+        stepping.save(&mut state);
+        ledger.save(&mut state);
+        state.set("totals.ghost", ghost_energy);
+        state
+    };
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
         let stopped = |why: String, completed: usize| {
@@ -65,6 +81,8 @@ pub fn run<const D: usize>(
                 if stepping.refuse() {
                     continue;
                 }
+                let state = state_of(&stepping, &ledger, ghost_energy);
+                recorder.keep_last_state(world, model, points, state)?;
                 return Ok(stopped(why, stepping.completed()));
             }
         };
@@ -79,10 +97,8 @@ pub fn run<const D: usize>(
         ghost_energy += solved.ghost_work;
         row.energy_ghost += ghost_energy;
         row.cuts = stepping.cuts;
-        row.wall_seconds = clock.elapsed();
         let last = stepping.next_span().is_none();
         clock.time(Phase::Output, || {
-            recorder.step(world, &row, true)?;
             if ended && recorder.wants_frame(number, span.time_end, last) {
                 let time = span.time_end;
                 recorder.frame(world, number, time, points)?;
@@ -102,7 +118,23 @@ pub fn run<const D: usize>(
         if let Some(grid) = solved.moved_grid {
             model.grid = grid;
         }
-        clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+        let busy = clock.busy();
+        let settle = || balance::settle(world, model, points, busy);
+        row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
+        row.wall_seconds = clock.elapsed();
+        let moment = match (last, ended) {
+            (true, _) => Moment::End,
+            (_, true) => Moment::Step,
+            (_, false) => Moment::PartOfStep,
+        };
+        let state = state_of(&stepping, &ledger, ghost_energy);
+        let stop = clock.time(Phase::Output, || {
+            recorder.step(world, &row, true)?;
+            recorder.end_step(world, model, points, moment, state)
+        })?;
+        if let Some(ending) = stop {
+            return Ok(ending);
+        }
     }
     Ok(Ending::completed())
 }

@@ -1,6 +1,8 @@
 //! Energies, momenta and work of a dynamic run, step by step, and the fault they reveal: energy
 //! that grows without work means a time step over the stability limit.
 
+use crate::error::Result;
+use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::points::Points;
@@ -105,8 +107,29 @@ impl Ledger {
         Ledger { start: start.total(), work: 0.0, gross_work: 0.0, noise: NOISE * wave_energy }
     }
 
+    /// Puts the sums into a checkpoint.
+    pub fn save(&self, state: &mut RunState) {
+        for (name, value) in [
+            ("ledger.start", self.start),
+            ("ledger.work", self.work),
+            ("ledger.gross_work", self.gross_work),
+            ("ledger.noise", self.noise),
+        ] {
+            state.set(name, value);
+        }
+    }
+
+    /// Takes the sums out of a checkpoint.
+    pub fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.start = state.number("ledger.start")?;
+        self.work = state.number("ledger.work")?;
+        self.gross_work = state.number("ledger.gross_work")?;
+        self.noise = state.number("ledger.noise")?;
+        Ok(())
+    }
+
     /// Books a step into its row. The answer names energy that came from nowhere.
-    pub fn book(&mut self, entry: &Entry, row: &mut HistoryRow) -> Result<(), String> {
+    pub fn book(&mut self, entry: &Entry, row: &mut HistoryRow) -> std::result::Result<(), String> {
         self.work += entry.work;
         self.gross_work += entry.work.abs();
         row.energy_kinetic = entry.kinetic;

@@ -8,8 +8,10 @@
 //! `type = "conditioning"` gives the limit of the true eigenvalues for any position.
 
 use crate::deck::model::{Analysis, Mass};
+use crate::error::Result;
 use crate::grid::Grid;
 use crate::material::Material;
+use crate::output::RunState;
 use crate::parallel::World;
 use crate::points::Points;
 
@@ -34,6 +36,19 @@ impl TimeSteps {
             done: 0,
             time: 0.0,
         }
+    }
+
+    /// Puts the position into a checkpoint.
+    pub fn save(&self, state: &mut RunState) {
+        state.set_count("time_steps.done", self.done as u64);
+        state.set("time_steps.time", self.time);
+    }
+
+    /// Takes the position out of a checkpoint.
+    pub fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.done = state.count("time_steps.done")? as usize;
+        self.time = state.number("time_steps.time")?;
+        Ok(())
     }
 
     /// True where the steps follow the stability limit.
