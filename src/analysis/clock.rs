@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use crate::error::Result;
 use crate::output::summary::PhaseSeconds;
+use crate::parallel::traffic;
 use crate::petsc::log::{Phase, Stages};
 
 /// Seconds since the start and per phase.
@@ -12,12 +13,19 @@ pub struct Clock {
     stages: Option<Stages>,
     seconds: [f64; Phase::ALL.len()],
     setup: f64,
+    busy: f64,
 }
 
 impl Clock {
     /// Starts now. `stages` is `None` where PETSc does not run.
     pub fn new(stages: Option<Stages>) -> Self {
-        Clock { start: Instant::now(), stages, seconds: [0.0; Phase::ALL.len()], setup: 0.0 }
+        Clock {
+            start: Instant::now(),
+            stages,
+            seconds: [0.0; Phase::ALL.len()],
+            setup: 0.0,
+            busy: 0.0,
+        }
     }
 
     /// Everything until now was set-up.
@@ -28,9 +36,13 @@ impl Clock {
     /// Runs `work` under a phase.
     pub fn time<T>(&mut self, phase: Phase, work: impl FnOnce() -> Result<T>) -> Result<T> {
         let entered = self.stages.as_ref().map(|stages| stages.enter(phase)).transpose()?;
-        let begin = Instant::now();
+        let (begin, before) = (Instant::now(), traffic::so_far());
         let outcome = work();
-        self.add(phase, begin.elapsed().as_secs_f64());
+        let seconds = begin.elapsed().as_secs_f64();
+        self.add(phase, seconds);
+        if matches!(phase, Phase::Locate | Phase::Assemble | Phase::Update) {
+            self.add_busy(seconds - (traffic::so_far() - before).waited);
+        }
         drop(entered);
         outcome
     }
@@ -38,6 +50,17 @@ impl Clock {
     /// Counts seconds measured elsewhere.
     pub fn add(&mut self, phase: Phase, seconds: f64) {
         self.seconds[phase as usize] += seconds;
+    }
+
+    /// Counts seconds of this rank's own work, without what it waited for others, that were not
+    /// counted by [`Self::time`].
+    pub fn add_busy(&mut self, seconds: f64) {
+        self.busy += seconds.max(0.0);
+    }
+
+    /// s of this rank's own work on points: locate, assemble, update, without waiting.
+    pub fn busy(&self) -> f64 {
+        self.busy
     }
 
     /// s since the start

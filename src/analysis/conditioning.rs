@@ -47,7 +47,8 @@ pub fn run<const D: usize>(
                 *x += total / steps as f64;
             }
         }
-        clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+        let busy = clock.busy();
+        clock.time(Phase::Migrate, || balance::settle(world, model, points, busy))?;
         let span = StepSpan {
             factor_start: (number - 1) as f64 / steps as f64,
             factor_end: number as f64 / steps as f64,

@@ -15,6 +15,8 @@ use crate::material::Material;
 use crate::parallel::{Partition, World};
 use crate::points::Points;
 
+use super::balance::Balance;
+
 /// What stays the same while points move: the deck made computable.
 pub struct Model<const D: usize> {
     pub deck: Deck,
@@ -26,6 +28,7 @@ pub struct Model<const D: usize> {
     pub penalties: Vec<Penalty>,
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
+    pub balance: Balance,
 }
 
 /// Everything a step needs that depends on where the points are at its start.

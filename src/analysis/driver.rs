@@ -132,7 +132,8 @@ impl Run<'_> {
                     same_directory: checkpointing::lies_in(world, &found.path, out),
                 };
                 let (used, step) = (found.path.clone(), found.step);
-                let (model, points) = setup::restore(world, deck, found)?;
+                let (mut model, points) = setup::restore(world, deck, found)?;
+                model.balance.restore(&resume.state)?;
                 (model, points, Some((resume, used, step)))
             }
         };

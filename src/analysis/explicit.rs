@@ -111,7 +111,8 @@ pub fn run<const D: usize>(
             }
             Ok(())
         })?;
-        clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+        let busy = clock.busy();
+        clock.time(Phase::Migrate, || balance::settle(world, model, points, busy))?;
         let moment = if last { Moment::End } else { Moment::Step };
         let state = state_of(&steps, &ledger);
         let stop =

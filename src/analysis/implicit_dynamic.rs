@@ -120,7 +120,8 @@ pub fn run<const D: usize>(
         if let Some(grid) = solved.moved_grid {
             model.grid = grid;
         }
-        clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+        let busy = clock.busy();
+        clock.time(Phase::Migrate, || balance::settle(world, model, points, busy))?;
         let moment = match (last, ended) {
             (true, _) => Moment::End,
             (_, true) => Moment::Step,

@@ -2,7 +2,7 @@
 //! analyses share.
 
 use crate::error::Result;
-use crate::parallel::World;
+use crate::parallel::{World, traffic};
 use crate::petsc::log::Phase;
 use crate::petsc::snes::NewtonOutcome;
 use crate::petsc::{Matrix, Vector};
@@ -60,7 +60,7 @@ pub fn solve<const D: usize>(
         solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
     })?;
     let mut solution = matrix.vector()?;
-    let before = clock.elapsed();
+    let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
     let stabilised = model.penalties.iter().all(|penalty| penalty.stiffness > 0.0);
     let (outcome, used) = solve_robustly(
         world,
@@ -75,6 +75,8 @@ pub fn solve<const D: usize>(
     }
     let assembled = problem.assembly_seconds;
     clock.add(Phase::Assemble, assembled);
+    // Our own waiting inside the solver is that of assembly; PETSc keeps its own account.
+    clock.add_busy(assembled - (traffic::so_far().waited - waited));
     clock.add(Phase::Solve, clock.elapsed() - before - assembled);
 
     recorder.iterations(world, number, &problem.errors)?;

@@ -67,9 +67,7 @@ pub fn run<const D: usize>(
                 totals.ghost += row.energy_ghost;
                 (row.work_external, row.energy_ghost) = (totals.work, totals.ghost);
                 row.cuts = stepping.cuts;
-                row.wall_seconds = clock.elapsed();
                 clock.time(Phase::Output, || {
-                    recorder.step(world, &row, true)?;
                     if frame_due {
                         recorder.frame(world, number, span.factor_end, points)?;
                         recorder.grid_frame(
@@ -87,7 +85,11 @@ pub fn run<const D: usize>(
                 if let Some(grid) = solved.moved_grid {
                     model.grid = grid;
                 }
-                clock.time(Phase::Migrate, || balance::settle(world, model, points))?;
+                let busy = clock.busy();
+                let settle = || balance::settle(world, model, points, busy);
+                row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
+                row.wall_seconds = clock.elapsed();
+                clock.time(Phase::Output, || recorder.step(world, &row, true))?;
                 let moment = match (stepping.next_span(), ended) {
                     (None, _) => Moment::End,
                     (_, true) => Moment::Step,

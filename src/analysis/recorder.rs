@@ -11,7 +11,7 @@ use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
 use crate::output::log::Log;
 use crate::output::progress::{NewtonReport, Progress, StepReport};
-use crate::output::summary::{Count, Status};
+use crate::output::summary::{BalanceReport, Count, Status};
 use crate::output::{
     GridFrame, GridSeries, History, PointField, PointsSeries, Residuals, ResultsDirectory,
     RunState, Summary,
@@ -43,6 +43,7 @@ pub struct Recorder {
     pub versions: BTreeMap<String, String>,
     populated_cells: usize,
     imbalance: f64,
+    balance: BalanceReport,
     checkpointer: Checkpointer,
     resumed: Option<RunState>,
     /// s that earlier parts of the run took.
@@ -138,6 +139,7 @@ impl Recorder {
             versions,
             populated_cells: 0,
             imbalance: 1.0,
+            balance: BalanceReport::default(),
             checkpointer,
             resumed: None,
             earlier_seconds: 0.0,
@@ -167,6 +169,7 @@ impl Recorder {
         moment: Moment,
         state: RunState,
     ) -> Result<Option<Ending>> {
+        self.balance = model.balance.report();
         let (due, signal) = self.checkpointer.due(world, self.steps_completed, moment);
         if due || signal.is_some() {
             self.checkpoint(world, model, points, state)?;
@@ -175,11 +178,11 @@ impl Recorder {
             status: Status::Stopped,
             on_request: true,
             reason: format!(
-                "{} asked the run to stop after step {} of {}; a checkpoint was written: go on \
-                 with --restart last",
+                "{} asked the run to stop, after step {}{}; a checkpoint was written: go on with \
+                 --restart last",
                 signal.name(),
                 self.steps_completed,
-                self.steps.map_or("?".to_string(), |steps| steps.to_string())
+                self.steps.map_or(String::new(), |steps| format!(" of {steps}"))
             ),
         }))
     }
@@ -207,6 +210,7 @@ impl Recorder {
         mut state: RunState,
     ) -> Result<()> {
         self.save(&mut state);
+        model.balance.save(&mut state);
         let step = self.steps_completed;
         let path = self.checkpointer.write(world, step, model, points, &state)?;
         self.log.note(&format!("checkpoint: {}", path.display()));
@@ -382,6 +386,7 @@ impl Recorder {
             wall_seconds: clock.phases(),
             peak_memory_bytes: peak_memory(world.comm()),
             imbalance: self.imbalance,
+            balance: self.balance,
             verify,
             bodies: deck.bodies.iter().map(|body| body.name.clone()).zip(bodies).collect(),
             versions: self.versions.clone(),

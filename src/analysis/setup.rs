@@ -3,7 +3,7 @@
 
 use crate::assembly::manufactured::Manufactured;
 use crate::deck::Deck;
-use crate::deck::model::{self, Load};
+use crate::deck::model::{self, Initial, Load};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
@@ -13,6 +13,7 @@ use crate::parallel::{self, Partition, World};
 use crate::points::Points;
 use crate::points::seed::{self, Share};
 
+use super::balance::Balance;
 use super::discretise::Model;
 
 /// Builds the model and this rank's points. Collective.
@@ -21,7 +22,11 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     let share = Share { rank: world.rank(), ranks: world.size() };
     let mut points = world.fail_together(seed::seed(&deck, &grid, share))?;
     check_bodies(world, &deck, &grid, &points)?;
-    let partition = Partition::build(world, &grid, deck.parallel.brick, &points, None)?;
+    let brick = deck.parallel.brick;
+    let partition = match deck.parallel.initial {
+        Initial::Balanced => Partition::build(world, &grid, brick, &points, None)?,
+        Initial::Slabs => Partition::slabs(world, &grid, brick, &points)?,
+    };
     parallel::migrate(world, &partition, &grid, &mut points)?;
     place_point_forces(world, &deck, &mut points)?;
     Ok((model_of(deck, grid, partition)?, points))
@@ -76,7 +81,8 @@ fn model_of<const D: usize>(
         _ => None,
     });
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
-    Ok(Model { deck, grid, partition, materials, penalties, manufactured })
+    let balance = Balance::default();
+    Ok(Model { deck, grid, partition, materials, penalties, manufactured, balance })
 }
 
 fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {

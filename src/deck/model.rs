@@ -374,10 +374,30 @@ pub struct Checkpoint {
     pub keep: usize,
 }
 
+/// How the first partition is made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Initial {
+    Balanced,
+    /// Equal slices of the grid, for comparison.
+    Slabs,
+}
+
+/// What a point costs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cost {
+    /// One: partitions, and so results, repeat bit by bit.
+    Points,
+    /// The seconds that its rank spends, smoothed: follows uneven machines and materials.
+    Time,
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parallel {
+    pub initial: Initial,
+    /// What is levelled.
+    pub cost: Cost,
     /// Cells per side of a lattice brick, the unit of partition; `None`: chosen by size.
     pub brick: Option<usize>,
-    /// Repartition when max/mean cost exceeds this (default 1.2); 0 switches it off.
+    /// Repartition when max/mean cost exceeds this (default 1.1); 0 switches it off.
     pub rebalance_above: f64,
 }

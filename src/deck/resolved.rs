@@ -349,6 +349,8 @@ fn results(w: &mut Writer, deck: &Deck) {
     }
     w.table("[parallel]");
     w.optional("parallel", "brick", deck.parallel.brick.map(|cells| cells.to_string()));
+    w.line("parallel", "initial", quote(deck.parallel.initial.name()));
+    w.line("parallel", "cost", quote(deck.parallel.cost.name()));
     w.line("parallel", "rebalance_above", number(deck.parallel.rebalance_above));
     if !deck.petsc.is_empty() {
         w.table("[petsc]");

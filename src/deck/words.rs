@@ -1,8 +1,8 @@
 //! The deck's own words for the enumerations of the model.
 
 use super::model::{
-    AnalysisType, Basis, DomainUpdate, Element, Frame, GhostScaling, InvertedIterates, Mass,
-    OnFailure, StressUpdate, VerifyNorm,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
+    InvertedIterates, Mass, OnFailure, StressUpdate, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -53,5 +53,7 @@ words! {
     StressUpdate { "usf" => Usf, "usl" => Usl, "musl" => Musl }
     GhostScaling { "scale-free" => ScaleFree, "literal" => Literal, "published" => Published }
     Element { "quad4" => Quad4, "tri3" => Tri3, "hex8" => Hex8, "tet4" => Tet4 }
+    Initial { "balanced" => Balanced, "slabs" => Slabs }
+    Cost { "points" => Points, "time" => Time }
     VerifyNorm { "volume-l1" => VolumeL1, "volume-l2" => VolumeL2, "max" => Max }
 }

@@ -55,6 +55,8 @@ pub struct HistoryRow {
     pub cuts: usize,
     /// Largest cost of a rank over the mean.
     pub imbalance: f64,
+    /// Share of the points that changed rank at the end of the step.
+    pub moved_points: f64,
     /// s since the start of the run.
     pub wall_seconds: f64,
     /// For [`Layout::conditioning`].
@@ -126,6 +128,7 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
     cell("populated_cells".into(), "-", row.populated_cells as f64);
     cell("cuts".into(), "-", row.cuts as f64);
     cell("imbalance".into(), "-", row.imbalance);
+    cell("moved_points".into(), "-", row.moved_points);
     cell("wall_seconds".into(), "s", row.wall_seconds);
     if layout.conditioning {
         let c = &row.conditioning;
@@ -206,7 +209,8 @@ mod tests {
              momentum_z [kg/s],angular_momentum_x [kg m/s],angular_momentum_y [kg m/s],\
              angular_momentum_z [kg m/s],reaction.root.x [N/m],reaction.root.y [N/m],\
              reaction.root.sum_abs [N/m],reaction.root.torque [N],ghost_faces [-],\
-             populated_cells [-],cuts [-],imbalance [-],wall_seconds [s]"
+             populated_cells [-],cuts [-],imbalance [-],moved_points [-],\
+             wall_seconds [s]"
         );
     }
 

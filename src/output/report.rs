@@ -136,6 +136,18 @@ pub fn closing(summary: &Summary, results: &std::path::Path) -> String {
         }
     }
     row("imbalance", format!("{:.2} (largest cost of a rank over the mean)", summary.imbalance));
+    let balance = summary.balance;
+    if balance.rebalanced > 0 {
+        row(
+            "rebalanced",
+            format!(
+                "{} times, {:.0} % of the points moved for it, imbalance at most {:.2}",
+                balance.rebalanced,
+                100.0 * balance.moved_share,
+                balance.largest_imbalance
+            ),
+        );
+    }
     let memory = summary.peak_memory_bytes;
     row("peak memory", format!("{} ({} on one rank)", bytes(memory.sum), bytes(memory.max)));
     for (name, value) in &summary.verify {

@@ -38,6 +38,7 @@ pub struct Summary {
     pub peak_memory_bytes: PeakMemory,
     /// Largest cost of a rank over the mean, at the end.
     pub imbalance: f64,
+    pub balance: BalanceReport,
     /// Figures of merit of the deck's `[[verify]]`.
     pub verify: BTreeMap<String, f64>,
     pub bodies: BTreeMap<String, BodySummary>,
@@ -57,6 +58,17 @@ impl Count {
         self.total += iterations;
         self.max = self.max.max(iterations);
     }
+}
+
+/// What kept the ranks equally loaded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct BalanceReport {
+    /// New partitions taken.
+    pub rebalanced: usize,
+    /// Share of the points that changed rank for them, summed over all of them.
+    pub moved_share: f64,
+    /// Largest imbalance of the run.
+    pub largest_imbalance: f64,
 }
 
 /// Wall time by phase, s: the largest of all ranks.
@@ -145,7 +157,7 @@ mod tests {
         };
         assert_eq!(
             keys(&value),
-            "bodies cells_populated imbalance linear_iterations newton_iterations \
+            "balance bodies cells_populated imbalance linear_iterations newton_iterations \
              peak_memory_bytes points ranks reason status steps_completed steps_requested title \
              verify versions wall_seconds"
         );

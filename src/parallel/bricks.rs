@@ -6,7 +6,7 @@ use crate::grid::Lattice;
 /// Largest brick side chosen automatically: larger ones make ragged parts and save nothing.
 const LARGEST_SIDE: usize = 16;
 /// Largest table of owners chosen automatically, units (four bytes each, on every rank).
-const LARGEST_TABLE: usize = 4 << 20;
+pub(super) const LARGEST_TABLE: usize = 4 << 20;
 /// Populated bricks that every rank should have, so that loads can be levelled to about 2 %.
 const BRICKS_PER_RANK: usize = 50;
 
@@ -68,6 +68,16 @@ impl<const D: usize> Bricks<D> {
     /// edges of the grid.
     pub fn of_node(&self, node: [usize; D]) -> usize {
         self.of_cell(std::array::from_fn(|axis| node[axis].min(self.cells[axis] - 1)))
+    }
+
+    /// Place of a brick among those along x, and how many there are.
+    pub fn along_x(&self, brick: usize) -> (usize, usize) {
+        (self.index(brick)[0], self.counts[0])
+    }
+
+    /// Index of the cell at a brick's lower corner.
+    pub fn first_cell(&self, brick: usize) -> [usize; D] {
+        self.index(brick).map(|i| i * self.side)
     }
 
     /// Calls `visit` with each brick that shares a face, an edge or a corner, in ascending order,

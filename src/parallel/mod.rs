@@ -8,6 +8,7 @@
 //! | `bricks.rs` | units of partition on a lattice |
 //! | `cells.rs` | units of partition on a mesh |
 //! | `metis.rs` | the partitioner |
+//! | `diffuse.rs` | an old partition levelled by few moves |
 //! | `partition.rs` | owner of each unit, cell and node |
 //! | `migrate.rs` | points to the ranks that own their cells |
 //! | `traffic.rs` | messages, bytes and reductions, counted |
@@ -15,6 +16,7 @@
 
 pub mod bricks;
 pub mod cells;
+pub mod diffuse;
 pub mod exchange;
 pub mod halo;
 pub mod metis;

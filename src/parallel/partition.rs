@@ -8,10 +8,10 @@ use std::collections::VecDeque;
 use bytemuck::{Pod, Zeroable};
 use rustc_hash::{FxHashMap, FxHashSet};
 
-use super::bricks::Bricks;
+use super::bricks::{self, Bricks};
 use super::cells::CellGraph;
 use super::metis::{self, Graph};
-use super::{World, exchange};
+use super::{World, diffuse, exchange};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::points::Points;
@@ -40,6 +40,11 @@ struct UnitCost {
 }
 
 const NOBODY: u32 = u32::MAX;
+/// Handing over stops at this max/mean: what is left is less than bricks can level.
+const LEVEL_ENOUGH: f64 = 1.03;
+/// Handing over may lengthen the cut by this factor over METIS's; its messages cost every step,
+/// a migration once.
+const FRAYED: f64 = 1.25;
 
 impl<const D: usize> Partition<D> {
     /// Partitions the grid for points lying anywhere (each counted on the rank that holds it).
@@ -69,8 +74,31 @@ impl<const D: usize> Partition<D> {
         Ok(partition)
     }
 
-    /// A new partition into the same units for where the points are now; parts keep the ranks
-    /// that hold most of them. Collective. Errors as in [`Self::build`].
+    /// Equal slices of the grid, wherever the points are: along x on a lattice, by the numbers
+    /// of its cells on a mesh. Where to start from to see a run balance itself. Collective.
+    /// Errors: as [`Self::build`].
+    pub fn slabs(
+        world: &World,
+        grid: &Grid<D>,
+        brick: Option<usize>,
+        points: &Points<D>,
+    ) -> Result<Self> {
+        let mut partition = Self::build(world, grid, brick, points, None)?;
+        let (units, ranks) = (partition.unit_count(), world.size());
+        partition.owner = (0..units)
+            .map(|unit| match &partition.units {
+                Units::Bricks(bricks) => bricks.along_x(unit),
+                Units::Cells(_) => (unit, units),
+            })
+            .map(|(place, places)| (place * ranks / places) as u32)
+            .collect();
+        Ok(partition)
+    }
+
+    /// A new partition into the same units for where the points are now. Few points move: units
+    /// are handed over between neighbours, or, if that levels badly or frays the parts, dealt
+    /// out anew with each part kept by the rank that holds most of it. Collective. Errors as in
+    /// [`Self::build`].
     pub fn rebuild(
         &self,
         world: &World,
@@ -82,6 +110,21 @@ impl<const D: usize> Partition<D> {
         let mut partition = self.clone();
         partition.assign(world, grid, &cells, costs)?;
         Ok(partition)
+    }
+
+    /// The same partition in bricks of half the side; `None` where they cannot be smaller.
+    pub fn refined(&self, grid: &Grid<D>) -> Option<Self> {
+        let (Units::Bricks(bricks), Grid::Lattice(lattice)) = (&self.units, grid) else {
+            return None;
+        };
+        let finer = Bricks::new(lattice, bricks.side() / 2);
+        if bricks.side() < 2 || finer.count() > bricks::LARGEST_TABLE {
+            return None;
+        }
+        let owner = (0..finer.count())
+            .map(|unit| self.owner[bricks.of_cell(finer.first_cell(unit))])
+            .collect();
+        Some(Partition { units: Units::Bricks(finer), owner })
     }
 
     /// A partition as it was: bricks of `brick` cells a side, or the cells of a mesh, with their
@@ -238,9 +281,17 @@ impl<const D: usize> Partition<D> {
             graph.costs.push(entry.cost.max(f64::MIN_POSITIVE));
         }
         let mut part = metis::split(&graph, ranks)?;
-        if !self.owner.is_empty() {
+        if !self.owner.is_empty() && !load.is_empty() {
             let old: Vec<u32> = load.iter().map(|e| self.owner[e.unit as usize]).collect();
             relabel(&mut part, &old, &graph.costs, ranks);
+            let mut near = old;
+            let reached = diffuse::level(&graph, &mut near, ranks, LEVEL_ENOUGH);
+            let goal = LEVEL_ENOUGH.max(largest_over_mean(&graph.costs, &part, ranks));
+            let frayed =
+                diffuse::cut(&graph, &near) as f64 > FRAYED * diffuse::cut(&graph, &part) as f64;
+            if reached <= goal && !frayed {
+                part = near;
+            }
         }
         let mut owner = vec![NOBODY; self.unit_count()];
         for (entry, &rank) in load.iter().zip(&part) {
@@ -267,6 +318,12 @@ impl<const D: usize> Partition<D> {
         // No points at all, or parts of a mesh that hang together with none of them.
         owner.iter_mut().filter(|rank| **rank == NOBODY).for_each(|rank| *rank = 0);
     }
+}
+
+fn largest_over_mean(costs: &[f64], part: &[u32], parts: usize) -> f64 {
+    let mut load = vec![0.0; parts];
+    part.iter().zip(costs).for_each(|(&p, cost)| load[p as usize] += cost);
+    load.iter().copied().fold(0.0, f64::max) * parts as f64 / costs.iter().sum::<f64>()
 }
 
 /// Renames parts so that as much cost as possible stays with its old owner: the largest overlaps

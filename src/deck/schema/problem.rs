@@ -8,8 +8,8 @@ use super::Need::{Default, Optional, Required};
 use super::{POSITIVE, Section, at_least, between, key};
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
-    AnalysisType, Basis, DomainUpdate, Element, Frame, GhostScaling, InvertedIterates, Mass,
-    OnFailure, StressUpdate, VerifyNorm,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
+    InvertedIterates, Mass, OnFailure, StressUpdate, VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -270,9 +270,21 @@ pub const RESULT_SECTIONS: &[Section] = &[
             )
             .range(at_least(1.0)),
             key(
+                "initial",
+                Choice(Initial::NAMES),
+                Default("\"balanced\""),
+                "First partition: by the points, or equal slices of the grid for comparison.",
+            ),
+            key(
+                "cost",
+                Choice(Cost::NAMES),
+                Default("\"points\""),
+                "What is levelled: points (repeats bit by bit), or measured time.",
+            ),
+            key(
                 "rebalance_above",
                 Number,
-                Default("1.2"),
+                Default("1.1"),
                 "Repartition when the largest cost exceeds this times the mean; 0: never.",
             )
             .range(at_least(0.0)),

@@ -105,6 +105,7 @@ fn every(table: &Table<'_>) -> Got<Every> {
 
 pub fn parallel(table: &Table<'_>) -> Got<Parallel> {
     let (brick, above) = (table.count_if("brick"), table.number("rebalance_above"));
+    let (initial, cost) = (table.choice("initial"), table.choice("cost"));
     let above = above?;
     if above != 0.0 && above < 1.0 {
         return Err(table.problem(
@@ -112,7 +113,7 @@ pub fn parallel(table: &Table<'_>) -> Got<Parallel> {
             format!("expected 0 (never) or a number >= 1, found {above}"),
         ));
     }
-    Ok(Parallel { brick: brick?, rebalance_above: above })
+    Ok(Parallel { brick: brick?, initial: initial?, cost: cost?, rebalance_above: above })
 }
 
 /// Option names without a dash, with their values as PETSc reads them.
