@@ -20,5 +20,7 @@ if [ "$ranks" -gt "$cores" ]; then
     # Waiting ranks give way to working ones.
     export OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
 fi
+# After SIGTERM a rank may finish its step and write a checkpoint before it is killed, s.
+export OMPI_MCA_odls_base_sigkill_timeout="${OMPI_MCA_odls_base_sigkill_timeout:-60}"
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}"
 exec mpirun -n "$ranks" "$@"

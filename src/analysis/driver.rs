@@ -15,6 +15,7 @@ use crate::output::log::Log;
 use crate::output::report::{self, Banner, Failure};
 use crate::output::summary::Status;
 use crate::parallel::{World, signals};
+use crate::petsc::known;
 use crate::petsc::log::Stages;
 use crate::petsc::session::{self, Session};
 
@@ -58,6 +59,7 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     let text = read_deck_text(world, arguments)?;
     let deck = world.fail_together(deck::read(&arguments.input, &text, &arguments.sets))?;
     let session = Session::start(universe, &deck.petsc, &arguments.petsc)?;
+    world.fail_together(known::require_known())?;
     let mut log = Log::new(world.comm());
     let versions = versions();
     log.say(&report::banner(&Banner {

@@ -19,6 +19,7 @@ use super::discretise::Model;
 /// Builds the model and this rank's points. Collective.
 pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {
     let grid = world.fail_together(build_grid(&deck))?;
+    check_tags(&deck, &grid)?;
     let share = Share { rank: world.rank(), ranks: world.size() };
     let mut points = world.fail_together(seed::seed(&deck, &grid, share))?;
     check_bodies(world, &deck, &grid, &points)?;
@@ -97,6 +98,16 @@ fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
         }
         model::Grid::Mesh(mesh) => Ok(Grid::Mesh(Mesh::build(&mesh.source)?)),
     }
+}
+
+/// Every boundary's tag names nodes of the mesh.
+fn check_tags<const D: usize>(deck: &Deck, grid: &Grid<D>) -> Result<()> {
+    for boundary in &deck.boundaries {
+        if let model::Place::Tag(tag) = &boundary.place {
+            grid.tagged_nodes(tag)?;
+        }
+    }
+    Ok(())
 }
 
 /// Every body has points, all inside the grid.

@@ -6,6 +6,7 @@
 //! | `check.rs` | return codes to errors; one rank's error becomes every rank's |
 //! | `session.rs` | start and end of PETSc, order of the options, abort |
 //! | `options.rs` | defaults that the user can override, options nobody read |
+//! | `known.rs` | options no solver knows, told before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
@@ -16,6 +17,7 @@
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
 mod check;
+pub mod known;
 pub mod ksp;
 pub mod log;
 pub mod matrix;

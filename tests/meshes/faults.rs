@@ -123,7 +123,7 @@ fn missing_tags() {
 
 #[test]
 fn files_that_are_not_there() {
-    let words = ["absent.msh", "cannot be read"];
+    let words = ["absent.msh", "cannot read"];
     refused("other.msh", "", &DECK.replace("MESH", "absent.msh"), 2, &words);
 }
 
@@ -162,5 +162,22 @@ fn points_and_corners_that_leave_the_mesh() {
         assert_eq!(code, 1, "{said}");
         assert!(said.contains("corner ") && said.contains("is outside the grid at"), "{said}");
         assert!(said.contains("step ") && said.contains("point "), "{said}");
+    }
+}
+
+/// In the plane the volume of a CPDI2 domain is that of its point: one says it for both.
+#[test]
+fn domains_that_turn_over() {
+    let outcome = Run::of("stretch")
+        .set("method.basis=\"cpdi2\"")
+        .set("boundary.2.displacement={ x = -6.0 }")
+        .set("analysis.steps=1")
+        .set("analysis.max_iterations=40")
+        .set("analysis.inverted_iterates=\"allow\"")
+        .attempt();
+    let said = outcome.stderr;
+    assert_eq!(outcome.code, 1, "{said}");
+    for word in ["step 1 of 1", "point ", "is turned inside out (det dF"] {
+        assert!(said.contains(word), "no `{word}` in:\n{said}");
     }
 }

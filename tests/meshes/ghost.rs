@@ -27,7 +27,7 @@ const LATTICE: &str = "type = \"lattice\"\norigin = [0, 0]\nsize = [11, 10]\nh =
 #[test]
 fn a_stabilised_beam_is_the_same_on_a_lattice_and_on_a_mesh_of_squares() {
     let quads = box_mesh("[0, 0]", "[11, 10]", "[22, 20]", "quad4");
-    for scaling in ["published", "literal", "scale-free"] {
+    for scaling in ["published", "scale-free"] {
         let run = |grid: &str| {
             let lattice = grid == LATTICE;
             let run = with_grid("beam", grid);
@@ -39,7 +39,7 @@ fn a_stabilised_beam_is_the_same_on_a_lattice_and_on_a_mesh_of_squares() {
             };
             run.set("method.basis=\"mpm\"")
                 .set("analysis.steps=10")
-                .set("analysis.tolerance=1e-10")
+                .set("analysis.tolerance=1e-8")
                 .set(format!("ghost.scaling=\"{scaling}\""))
                 .results()
         };
@@ -71,7 +71,9 @@ fn disc(grid: &str) -> Results {
          [material.soft]\nmodel = \"hencky\"\nyoung = 1.0\npoisson = 0.3\n\
          [[body]]\nname = \"disc\"\nmaterial = \"soft\"\ndensity = 1.0\n\
          lattice = {{ spacing = 0.0625 }}\n\
-         shape = {{ disc = {{ centre = [0.9, 0.9], radius = 0.5 }} }}\n"
+         shape = {{ disc = {{ centre = [0.9, 0.9], radius = 0.5 }} }}\n\
+         [[boundary]]\nwhere = {{ box = {{ min = [0.9, 0.9], max = [1.1, 1.1] }} }}\n\
+         fix = [\"x\", \"y\"]\n"
     );
     Run::text(&deck).results()
 }

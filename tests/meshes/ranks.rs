@@ -62,7 +62,7 @@ fn all_cases_do_not_depend_on_the_ranks() {
     assert_same("collapse", &collapse, 40);
 }
 
-/// Turned by half a cell against its domains, the partition of the mesh runs through them: rows
+/// Turned by a quarter of a cell under its domains, the partition of the mesh runs through them: rows
 /// reach corners in cells of other ranks, and stay complete.
 #[test]
 fn a_partition_may_cut_domains() {
@@ -77,7 +77,7 @@ fn a_partition_may_cut_domains() {
             let deck = deck::read(&path, &text, &sets).unwrap();
             let (mut model, mut points) = setup::prepare::<2>(&world, deck).unwrap();
             let Grid::Mesh(mesh) = &mut model.grid else { panic!("a mesh") };
-            let turn = Some(([0.0; 2], 10f64.to_radians()));
+            let turn = Some(([0.0; 2], 5f64.to_radians()));
             mesh.advance(&MeshMotion::RotateWith("inner".into()), |_| None, turn).unwrap();
             parallel::migrate(&world, &model.partition, &model.grid, &mut points).unwrap();
 

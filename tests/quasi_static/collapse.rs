@@ -66,7 +66,10 @@ fn gimp(update: &str) -> Results {
 }
 
 /// (update, printed extent and height, expected ones where the printed are not reproduced).
-const TABLE_7: [(&str, [&str; 2], Option<[f64; 2]>); 6] = [
+/// Update, printed extent and height, and the values of ours that differ from them.
+type Row7 = (&'static str, [&'static str; 2], Option<[f64; 2]>);
+
+const TABLE_7: [Row7; 6] = [
     ("det", ["13.645", "6.316"], None),
     ("normal-corrected", ["13.769", "6.257"], None),
     ("normal-incremental", ["13.769", "6.257"], None),

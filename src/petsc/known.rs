@@ -1,0 +1,321 @@
+//! Options that no solver knows, told before the run instead of never.
+//!
+//! PETSc ignores what nobody asks for. Here each option that is still unread after the start is
+//! shown, under a name of its own, to solvers of all kinds: an option that none of them reads is
+//! a mistake. One that is known but not used by the run is only warned of at its end.
+
+use std::ptr::{null, null_mut};
+
+use super::check::{c_text, petsc};
+use super::{options, sys};
+use crate::error::{Error, Result};
+
+/// Prefixes of the program's solvers: equilibrium, mass, extreme eigenvalues.
+const PREFIXES: [&str; 3] = ["qs_", "mass_", "kappa_"];
+/// Prefixes that PETSc puts before the options of solvers inside solvers.
+const NESTED: [&str; 9] = [
+    "telescope_",
+    "mg_levels_",
+    "mg_coarse_",
+    "mg_fine_",
+    "sub_",
+    "esteig_",
+    "redundant_",
+    "inner_",
+    "npc_",
+];
+/// Beginnings of names that are read only while a system is solved.
+const READ_LATER: [&str; 8] = [
+    "mat_",
+    "vec_",
+    "ksp_view",
+    "ksp_converged",
+    "ksp_monitor",
+    "snes_view",
+    "snes_converged",
+    "snes_monitor",
+];
+/// Beginnings of unprefixed names that belong to no solver, or are read at PETSc's end.
+const GENERAL: [&str; 18] = [
+    "log",
+    "options_",
+    "malloc",
+    "memory_",
+    "objects_",
+    "info",
+    "on_error",
+    "help",
+    "version",
+    "viewer",
+    "get_total_flops",
+    "saws",
+    "mat",
+    "vec",
+    "sf_",
+    "is_",
+    "ao_",
+    "petsc",
+];
+const METHODS: [&str; 22] = [
+    "preonly",
+    "cg",
+    "gmres",
+    "fgmres",
+    "lgmres",
+    "dgmres",
+    "pgmres",
+    "bcgs",
+    "bcgsl",
+    "ibcgs",
+    "fbcgs",
+    "minres",
+    "richardson",
+    "chebyshev",
+    "tfqmr",
+    "pipecg",
+    "pipefgmres",
+    "fcg",
+    "gcr",
+    "cr",
+    "cgne",
+    "symmlq",
+];
+const PRECONDITIONERS: [&str; 24] = [
+    "none",
+    "lu",
+    "cholesky",
+    "ilu",
+    "icc",
+    "jacobi",
+    "pbjacobi",
+    "bjacobi",
+    "asm",
+    "gasm",
+    "sor",
+    "eisenstat",
+    "gamg",
+    "mg",
+    "hypre",
+    "ml",
+    "fieldsplit",
+    "composite",
+    "ksp",
+    "redundant",
+    "telescope",
+    "deflation",
+    "hmg",
+    "svd",
+];
+/// For suggestions.
+const USUAL: [&str; 22] = [
+    "ksp_type",
+    "ksp_rtol",
+    "ksp_atol",
+    "ksp_divtol",
+    "ksp_max_it",
+    "ksp_monitor",
+    "ksp_view",
+    "ksp_converged_reason",
+    "ksp_gmres_restart",
+    "ksp_norm_type",
+    "pc_type",
+    "pc_factor_mat_solver_type",
+    "pc_factor_shift_type",
+    "pc_hypre_type",
+    "pc_gamg_threshold",
+    "pc_gamg_type",
+    "mg_levels_ksp_type",
+    "mg_levels_pc_type",
+    "mg_coarse_pc_type",
+    "mat_mumps_icntl_14",
+    "snes_monitor",
+    "snes_linesearch_type",
+];
+/// The prefix under which options are shown around.
+const PROBE: &str = "probe_";
+
+/// An error that names every option nobody could know, and values that PETSc refuses. Call it
+/// after the session's start, before any solver is made.
+pub fn require_known() -> Result<()> {
+    let mut problems = Vec::new();
+    for option in options::unused()? {
+        let (name, value) = option.split_once(' ').unwrap_or((&option, ""));
+        let bare = name.trim_start_matches('-');
+        match judge(bare, value)? {
+            Answer::Known => {}
+            Answer::Unknown => problems.push(unknown(bare)?),
+            Answer::Refused(why) => {
+                problems.push(format!("PETSc does not accept {name} {value}: {why}"));
+            }
+        }
+    }
+    if problems.is_empty() { Ok(()) } else { Err(Error::Input(problems.join("\n"))) }
+}
+
+#[derive(Debug, PartialEq)]
+enum Answer {
+    Known,
+    Unknown,
+    Refused(String),
+}
+
+fn judge(name: &str, value: &str) -> Result<Answer> {
+    let begins = |list: &[&str], name: &str| list.iter().any(|word| name.starts_with(word));
+    let Some(own) = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix)) else {
+        return Ok(if begins(&GENERAL, name) { Answer::Known } else { Answer::Unknown });
+    };
+    let base = without_nesting(own);
+    if begins(&READ_LATER, base) { Ok(Answer::Known) } else { ask(base, value) }
+}
+
+/// `mg_levels_1_pc_type` is `pc_type` of a solver inside.
+fn without_nesting(mut name: &str) -> &str {
+    loop {
+        let inner = NESTED
+            .iter()
+            .find_map(|word| name.strip_prefix(word))
+            .or_else(|| {
+                name.strip_prefix("fieldsplit_").and_then(|rest| Some(rest.split_once('_')?.1))
+            })
+            .or_else(|| {
+                name.strip_prefix("ksp_")
+                    .filter(|rest| rest.starts_with("ksp_") || rest.starts_with("pc_"))
+            });
+        let Some(inner) = inner else { return name };
+        let digits = inner.trim_start_matches(|c: char| c.is_ascii_digit());
+        name = if digits.len() < inner.len() {
+            digits.strip_prefix('_').unwrap_or(inner)
+        } else {
+            inner
+        };
+    }
+}
+
+/// Shows the option to solvers of all kinds.
+fn ask(base: &str, value: &str) -> Result<Answer> {
+    let kinds = if base.starts_with("snes_") {
+        vec![Kind::Newton]
+    } else {
+        let methods = METHODS.iter().map(|method| Kind::Linear(method, "none"));
+        methods.chain(PRECONDITIONERS.iter().map(|pc| Kind::Linear("preonly", pc))).collect()
+    };
+    let shown = format!("-{PROBE}{base}");
+    let (key, text) = (c_text(&shown)?, c_text(value)?);
+    for kind in kinds {
+        // A kind that this PETSc lacks, or that cannot be set up alone, has no say.
+        if kind.read_options().is_err() {
+            continue;
+        }
+        petsc!(PetscOptionsSetValue(
+            null_mut(),
+            key.as_ptr(),
+            if value.is_empty() { null() } else { text.as_ptr() }
+        ))?;
+        let outcome = kind.read_options();
+        let mut used = sys::PETSC_FALSE;
+        petsc!(PetscOptionsUsed(null_mut(), key.as_ptr(), &mut used))?;
+        options::clear(&shown)?;
+        if used != sys::PETSC_FALSE {
+            return Ok(match outcome {
+                Ok(()) => Answer::Known,
+                Err(error) => Answer::Refused(essence(&error)),
+            });
+        }
+    }
+    Ok(Answer::Unknown)
+}
+
+/// PETSc's own words without the trace around them.
+fn essence(error: &Error) -> String {
+    let text = error.to_string();
+    let text = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest);
+    text.split(" (in ").next().unwrap_or(text).lines().next().unwrap_or(text).trim().to_string()
+}
+
+fn unknown(name: &str) -> Result<String> {
+    let own = PREFIXES.iter().find(|prefix| name.starts_with(**prefix));
+    let rest = own.map_or(name, |prefix| &name[prefix.len()..]);
+    if own.is_none() && judge(&format!("qs_{name}"), "")? != Answer::Unknown {
+        return Ok(format!(
+            "unknown PETSc option -{name}: options of the equilibrium solver begin with -qs_, of \
+             the mass solver with -mass_; did you mean -qs_{name}?"
+        ));
+    }
+    let nearest = USUAL
+        .iter()
+        .map(|usual| (strsim::jaro_winkler(rest, usual), usual))
+        .filter(|(likeness, _)| *likeness > 0.85)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    let prefix = own.unwrap_or(&"qs_");
+    let hint =
+        nearest.map_or(String::new(), |(_, usual)| format!("; did you mean -{prefix}{usual}?"));
+    Ok(format!("unknown PETSc option -{name}{hint}"))
+}
+
+/// A solver that is made only to read its options.
+#[derive(Clone, Copy)]
+enum Kind {
+    Newton,
+    /// Method and preconditioner.
+    Linear(&'static str, &'static str),
+}
+
+impl Kind {
+    fn read_options(self) -> Result<()> {
+        match self {
+            Kind::Newton => newton(),
+            Kind::Linear(method, pc) => linear(method, pc),
+        }
+    }
+}
+
+/// This process alone: every rank asks for itself.
+fn alone() -> sys::MPI_Comm {
+    // SAFETY: a constant of a running MPI.
+    unsafe { mpi::ffi::RSMPI_COMM_SELF }
+}
+
+fn newton() -> Result<()> {
+    let prefix = c_text(PROBE)?;
+    let mut snes = null_mut();
+    petsc!(SNESCreate(alone(), &mut snes))?;
+    let outcome = petsc!(SNESSetOptionsPrefix(snes, prefix.as_ptr()))
+        .and_then(|()| petsc!(SNESSetType(snes, sys::SNESNEWTONLS.as_ptr().cast())))
+        .and_then(|()| petsc!(SNESSetFromOptions(snes)));
+    petsc!(SNESDestroy(&mut snes))?;
+    outcome
+}
+
+fn linear(method: &str, pc_type: &str) -> Result<()> {
+    let (prefix, method, pc_name) = (c_text(PROBE)?, c_text(method)?, c_text(pc_type)?);
+    let (mut ksp, mut pc) = (null_mut(), null_mut());
+    petsc!(KSPCreate(alone(), &mut ksp))?;
+    let outcome = petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))
+        .and_then(|()| petsc!(KSPSetType(ksp, method.as_ptr())))
+        .and_then(|()| petsc!(KSPGetPC(ksp, &mut pc)))
+        .and_then(|()| petsc!(PCSetType(pc, pc_name.as_ptr())))
+        .and_then(|()| petsc!(KSPSetFromOptions(ksp)));
+    petsc!(KSPDestroy(&mut ksp))?;
+    outcome
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nested_prefixes_are_taken_off() {
+        for (name, base) in [
+            ("pc_type", "pc_type"),
+            ("mg_levels_pc_type", "pc_type"),
+            ("mg_levels_12_ksp_max_it", "ksp_max_it"),
+            ("telescope_mg_coarse_sub_pc_type", "pc_type"),
+            ("fieldsplit_u_ksp_rtol", "ksp_rtol"),
+            ("ksp_ksp_type", "ksp_type"),
+            ("mg_levels_esteig_ksp_type", "ksp_type"),
+            ("ksp_type", "ksp_type"),
+        ] {
+            assert_eq!(without_nesting(name), base, "{name}");
+        }
+    }
+}
