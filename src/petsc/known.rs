@@ -213,7 +213,9 @@ fn ask(base: &str, value: &str) -> Result<Answer> {
         ))?;
         let outcome = kind.read_options();
         let mut used = sys::PETSC_FALSE;
-        petsc!(PetscOptionsUsed(null_mut(), key.as_ptr(), &mut used))?;
+        // The database keeps names without their dash.
+        let stored = c_text(shown.trim_start_matches('-'))?;
+        petsc!(PetscOptionsUsed(null_mut(), stored.as_ptr(), &mut used))?;
         options::clear(&shown)?;
         if used != sys::PETSC_FALSE {
             return Ok(match outcome {
