@@ -85,7 +85,13 @@ fn defaults_given_are_defaults_left_out() {
 fn resolved_deck_reads_back_to_the_same_deck() {
     let changes: [&[&str]; 4] = [
         &[],
-        &["method.velocity_update=xpic", "parallel.brick=4", "petsc.a_b=[]", "petsc.a_b="],
+        &[
+            "method.velocity_update=xpic",
+            "method.mass=lumped",
+            "parallel.brick=4",
+            "petsc.a_b=[]",
+            "petsc.a_b=",
+        ],
         &["body.0.density=2e3", "title=\"tab\\t \\\" back \\\\\""],
         &["output.checkpoint={ every = 3, minutes = 2.5 }"],
     ];

@@ -72,7 +72,7 @@ fn disc(grid: &str) -> Results {
          [[body]]\nname = \"disc\"\nmaterial = \"soft\"\ndensity = 1.0\n\
          lattice = {{ spacing = 0.0625 }}\n\
          shape = {{ disc = {{ centre = [0.9, 0.9], radius = 0.5 }} }}\n\
-         [[boundary]]\nwhere = {{ box = {{ min = [0.9, 0.9], max = [1.1, 1.1] }} }}\n\
+         [[boundary]]\nwhere = {{ box = {{ min = [0.8, 0.8], max = [1.2, 1.2] }} }}\n\
          fix = [\"x\", \"y\"]\n"
     );
     Run::text(&deck).results()
