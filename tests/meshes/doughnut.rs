@@ -73,7 +73,7 @@ fn ten_degrees_agree_with_fine_finite_elements() {
     assert!(largest(&coarse) < 1e-3, "{coarse:?}");
     // The fine control itself, against the axisymmetric problem.
     let exact = axisymmetric::displacement(10.0, 400);
-    assert!(largest(&differences(&control, &exact)) < 1e-5);
+    assert!(largest(&differences(&control, &exact)) < 3e-5);
 }
 
 /// The coarse control converges at second order to the axisymmetric solution.
