@@ -1,0 +1,54 @@
+#!/bin/bash
+# test-slurm.sh FOLDER: under a Slurm (see one-machine-slurm.sh) submits the chain with jobs too
+# short for the run, one of them killed without warning, and the scaling scripts. Exit code 0 if
+# the chain ends with the whole run and the tables are there.
+set -uo pipefail
+
+folder=$1
+fail() {
+    echo "test: $1" >&2
+    squeue >&2
+    tail -n 20 "$folder"/*.log >&2
+    exit 1
+}
+. "$(pwd)/jobs/common.sh"
+steps=${STEPS:-800}
+export LINKS=15 MACHINE=local
+# Slurm counts whole minutes and looks every half minute: the warning comes at 0 to 30 s.
+export CHAIN_OPTIONS="--time=1 --signal=B:USR1@30 --output=$folder/chain-%j.log"
+first=$(sbatch --parsable --ntasks=2 $CHAIN_OPTIONS jobs/chain.sbatch tests/decks/restart.toml \
+    "$folder/out" --set "analysis.steps=$steps" --set "output.every=$steps" \
+    --set grid.h=0.0625 --set analysis.tolerance=1e-9 --set "output.checkpoint={every=50}") || fail "sbatch refused the chain"
+
+rows() { wc -l <"$folder/out/history.csv" 2>/dev/null || echo 0; }
+status() { sed -n 's/^  "status": "\(.*\)",$/\1/p' "$folder/out/summary.json" 2>/dev/null; }
+wait_for() {
+    what=$1
+    shift
+    for _ in $(seq "${PATIENCE:-900}"); do
+        "$@" && return
+        sleep 1
+    done
+    fail "$what"
+}
+# The first link: killed with all its processes, without warning, once it has left a checkpoint.
+wait_for "no checkpoint" sh -c "ls '$folder'/out/checkpoint-*.h5 >/dev/null 2>&1"
+scancel --signal=KILL --full "$first"
+before=$(rows)
+# The links after it go on, some stopped by their time limit, to the end.
+ended() { [ "$(status)" = completed ] || [ -z "$(squeue -h)" ]; }
+wait_for "the chain does not end" ended
+[ "$(status)" = completed ] || fail "the chain ended early"
+[ "$before" -lt "$steps" ] || fail "the run was over before it was killed"
+[ "$(rows)" = $((steps + 1)) ] || fail "history.csv has $(rows) rows for $steps steps"
+echo "chain: killed at row $before, links: $(ls "$folder"/chain-*.log | wc -l)," \
+    "stopped by their limit: $(grep -l 'asked the run to stop' "$folder"/chain-*.log | wc -l)"
+wait_for "a link is left" sh -c '[ -z "$(squeue -h)" ]'
+
+export OUT=$folder/scaling RANKS="1 2" H=0.5
+for kind in strong weak; do
+    sbatch --wait --ntasks=2 --time=5 --output="$folder/$kind.log" jobs/$kind.sbatch >/dev/null ||
+        fail "$kind.sbatch failed"
+    [ -s "$OUT/$kind.csv" ] && [ -s "$OUT/$kind.svg" ] || fail "$kind.sbatch left no table"
+done
+echo "scaling: tables written"
