@@ -88,6 +88,18 @@ pub fn reason_to_refuse<const D: usize>(
     world.first_message(reason)
 }
 
+/// The first point of this rank whose state is not a number, if any.
+pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
+    let p = (0..points.len()).find(|&p| {
+        let sound = points.velocity[p].iter().chain(&points.kirchhoff_stress[p]);
+        !sound.chain(&points.position[p]).all(|value| value.is_finite())
+    })?;
+    Some(format!(
+        "point {} at {:?} m has velocity {:?} m/s, which with its stress is not finite",
+        points.id[p], points.position[p], points.velocity[p]
+    ))
+}
+
 /// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
 /// step, if any. Collective.
 #[allow(clippy::too_many_arguments)]

@@ -4,7 +4,7 @@
 use crate::basis::Influences;
 use crate::deck::Scope;
 use crate::deck::model::{AnalysisType, Load};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::points::Points;
 
@@ -12,7 +12,8 @@ use super::Numbering;
 use super::manufactured::Manufactured;
 
 /// Force on each point, N, at load factor `s` and time `t`. In quasi-static runs loads grow with
-/// the load factor unless an expression holds `s` or `t` itself.
+/// the load factor unless an expression holds `s` or `t` itself. Error: in dynamics, the first point
+/// whose force is not a number (a quasi-static step is refused by its residual and may be cut).
 pub fn point_forces<const D: usize>(
     points: &Points<D>,
     materials: &[Material],
@@ -56,6 +57,15 @@ pub fn point_forces<const D: usize>(
                 }
             }
         }
+    }
+    if kind != AnalysisType::QuasiStatic
+        && let Some(p) = forces.iter().position(|force| !force.iter().all(|f| f.is_finite()))
+    {
+        return Err(Error::Run(format!(
+            "the loads on point {} at {:?} m come to {:?} N at t = {time:.6e} s, which is not \
+             finite",
+            points.id[p], points.position[p], forces[p]
+        )));
     }
     Ok(forces)
 }
