@@ -10,6 +10,7 @@
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
+//! | rigid motions held? | `support.rs` | |
 //! | map and number: the grid side of a step | `discretise.rs` | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
 //! | Newton's method for a step | `newton.rs` | |
@@ -46,6 +47,7 @@ pub mod recorder;
 pub mod setup;
 pub mod solver;
 pub mod stepping;
+pub mod support;
 pub mod time_step;
 pub mod update;
 pub mod verify;
