@@ -4,13 +4,17 @@ mod common;
 
 use common::run::{Results, Run, relative_difference};
 
-/// Cells per metre are a fraction of those of the deck, the physics is the same.
-const SMALL: &str = "grid.h=0.1";
+/// Larger cells with fewer points, the physics is the same.
+const SMALL: [&str; 2] = ["grid.h=0.1", "body.0.points_per_cell=[2, 2]"];
 const OFF: &str = "parallel.rebalance_above=0";
 const OUTPUT: &str = "output.every={ seconds = 10 }";
 
-fn slump(h: &str) -> Run {
-    Run::of("slump").ranks(4).set(h)
+fn slump(settings: &[&str]) -> Run {
+    settings.iter().fold(Run::of("slump").ranks(4), |run, word| run.set(*word))
+}
+
+fn small() -> Run {
+    slump(&SMALL).set(OUTPUT)
 }
 
 /// All fields of the points at the end.
@@ -51,8 +55,8 @@ fn assert_levelled(results: &Results, steps: usize) {
 
 #[test]
 fn a_collapse_levels_itself_and_ends_as_without_it() {
-    let with = slump(SMALL).set(OUTPUT).results();
-    let without = slump(SMALL).set(OUTPUT).set(OFF).results();
+    let with = small().results();
+    let without = small().set(OFF).results();
     let steps = with.count("steps_completed");
     assert_levelled(&with, steps);
     assert!(without.number("imbalance") > 2.5, "it does not level by itself");
@@ -60,13 +64,13 @@ fn a_collapse_levels_itself_and_ends_as_without_it() {
     let error = difference(&with, &without);
     assert!(error < 1e-8, "{error:e}");
     // Points as the measure of cost: a repeat is the same bit by bit, migrations included.
-    let again = slump(SMALL).set(OUTPUT).results();
+    let again = small().results();
     assert_eq!(difference(&with, &again), 0.0);
     for column in ["imbalance", "moved_points", "energy_kinetic", "energy_plastic"] {
         assert_eq!(with.history(column), again.history(column), "{column}");
     }
     // Measured time as the cost: other partitions, the same answer.
-    let timed = slump(SMALL).set(OUTPUT).set("parallel.cost=\"time\"").results();
+    let timed = small().set("parallel.cost=\"time\"").results();
     assert!(timed.count("balance.rebalanced") > 0);
     let error = difference(&with, &timed);
     assert!(error < 1e-8, "{error:e}");
@@ -103,11 +107,11 @@ fn implicit_steps_do_not_notice_a_new_partition() {
 #[test]
 #[ignore = "half an hour on two cores: make validate"]
 fn half_a_million_points_level_themselves() {
-    let with = slump("grid.h=0.008").results();
+    let with = slump(&[]).results();
     assert_eq!(with.count("points"), 500_000);
     let steps = with.count("steps_completed");
     assert_levelled(&with, steps);
-    let without = slump("grid.h=0.008").set(OFF).results();
+    let without = slump(&[]).set(OFF).results();
     let error = difference(&with, &without);
     println!("{steps} steps, end {:.3}, difference {error:e}", with.number("imbalance"));
     assert!(error < 1e-8, "{error:e}");
