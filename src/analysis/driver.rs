@@ -22,7 +22,7 @@ use crate::petsc::session::{self, Session};
 use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
-use super::{conditioning, explicit, implicit_dynamic, quasi_static};
+use super::{balance, conditioning, explicit, implicit_dynamic, quasi_static};
 use super::{plan, setup, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
@@ -192,7 +192,10 @@ impl Run<'_> {
             }
         };
         let figures = quasi_static::figures(world, &model, &points, &recorder)?;
-        let summary = recorder.finish(world, &model.deck, &points, &clock, figures, &ending)?;
+        let (traffic, steps) = (clock.traffic(), recorder.steps_here());
+        let sent = balance::communication(world, &model, traffic, steps);
+        let summary =
+            recorder.finish(world, &model.deck, &points, &clock, sent, figures, &ending)?;
         recorder.log.say(&report::closing(&summary, &recorder.directory()));
         let unused = self.session.unused_options()?;
         if !unused.is_empty() {

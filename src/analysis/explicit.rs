@@ -82,9 +82,9 @@ pub fn run<const D: usize>(
         let entry = Entry::unite(world, points, sums);
         let mut row = std::mem::take(&mut solved.row);
         row.step = number;
-        row.wall_seconds = clock.elapsed();
         if let Err(why) = ledger.book(&entry, &mut row) {
             // The row shows what happened.
+            row.wall_seconds = clock.elapsed();
             recorder.step(world, &row, false)?;
             let (limit, _) = limit_now(model, points);
             return Ok(Ending::failed(at(&format!(
@@ -101,7 +101,6 @@ pub fn run<const D: usize>(
         }
         let last = steps.next(limit).is_none();
         clock.time(Phase::Output, || {
-            recorder.step(world, &row, false)?;
             if recorder.wants_frame(number, span.time_end, last) {
                 let time = span.time_end;
                 recorder.frame(world, number, time, points)?;
@@ -112,7 +111,10 @@ pub fn run<const D: usize>(
             Ok(())
         })?;
         let busy = clock.busy();
-        clock.time(Phase::Migrate, || balance::settle(world, model, points, busy))?;
+        let settle = || balance::settle(world, model, points, busy);
+        row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
+        row.wall_seconds = clock.elapsed();
+        clock.time(Phase::Output, || recorder.step(world, &row, false))?;
         let moment = if last { Moment::End } else { Moment::Step };
         let state = state_of(&steps, &ledger);
         let stop =

@@ -105,7 +105,10 @@ pub fn newton(
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
     snes.set_defaults(&linear.options(world.size()))?;
-    options::set_default("matptap_via", coarse_product(equations))?;
+    // Sequential matrices do not know these words.
+    if world.size() > 1 {
+        options::set_default("matptap_via", coarse_product(equations))?;
+    }
     snes.set_from_options()?;
     Ok(snes)
 }
