@@ -129,10 +129,8 @@ pub fn run<const D: usize>(
         ghost_energy += solved.ghost_work;
         row.energy_ghost += ghost_energy;
         row.cuts = stepping.cuts;
-        row.wall_seconds = clock.elapsed();
         let last = stepping.next_span().is_none();
         clock.time(Phase::Output, || {
-            recorder.step(world, &row, true)?;
             if ended && recorder.wants_frame(number, span.time_end, last) {
                 let time = span.time_end;
                 recorder.frame(world, number, time, points)?;
@@ -154,7 +152,10 @@ pub fn run<const D: usize>(
             model.grid = grid;
         }
         let busy = clock.busy();
-        clock.time(Phase::Migrate, || balance::settle(world, model, points, busy))?;
+        let settle = || balance::settle(world, model, points, busy);
+        row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
+        row.wall_seconds = clock.elapsed();
+        clock.time(Phase::Output, || recorder.step(world, &row, true))?;
         let moment = match (last, ended) {
             (true, _) => Moment::End,
             (_, true) => Moment::Step,

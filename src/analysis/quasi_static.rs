@@ -4,6 +4,7 @@
 use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::{map_forces, point_forces};
+use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -118,6 +119,12 @@ pub fn run<const D: usize>(
         }
     }
     Ok(Ending::completed())
+}
+
+/// The first load step of the deck.
+pub fn first_span(deck: &Deck) -> StepSpan {
+    let factor_end = 1.0 / deck.analysis.steps.unwrap_or(1) as f64;
+    StepSpan { factor_start: 0.0, factor_end, time_start: 0.0, time_end: 0.0 }
 }
 
 /// Sums over the run so far.

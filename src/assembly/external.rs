@@ -12,8 +12,7 @@ use super::Numbering;
 use super::manufactured::Manufactured;
 
 /// Force on each point, N, at load factor `s` and time `t`. In quasi-static runs loads grow with
-/// the load factor unless an expression holds `s` or `t` itself. Error: in dynamics, the first point
-/// whose force is not a number (a quasi-static step is refused by its residual and may be cut).
+/// the load factor unless an expression holds `s` or `t` itself.
 pub fn point_forces<const D: usize>(
     points: &Points<D>,
     materials: &[Material],
@@ -58,16 +57,14 @@ pub fn point_forces<const D: usize>(
             }
         }
     }
-    if kind != AnalysisType::QuasiStatic
-        && let Some(p) = forces.iter().position(|force| !force.iter().all(|f| f.is_finite()))
-    {
-        return Err(Error::Run(format!(
-            "the loads on point {} at {:?} m come to {:?} N at t = {time:.6e} s, which is not \
-             finite",
+    match forces.iter().position(|force| force.iter().any(|f| !f.is_finite())) {
+        None => Ok(forces),
+        Some(p) => Err(Error::Run(format!(
+            "the load on point {} at {:?} is not finite ({:?} N at s = {load_factor}): check the \
+             expressions of [[load]]",
             points.id[p], points.position[p], forces[p]
-        )));
+        ))),
     }
-    Ok(forces)
 }
 
 /// Variables of an expression at a point.

@@ -12,7 +12,7 @@
 
 pub use crate::deck::model::Element;
 
-use super::lattice::CELL_CORNERS;
+use super::lattice::{CELL_CORNERS, CORNER_SIGNS};
 
 const TRI_FACES: [&[usize]; 3] = [&[0, 1], &[1, 2], &[2, 0]];
 const QUAD_FACES: [&[usize]; 4] = [&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
@@ -55,7 +55,7 @@ impl Element {
         if self.is_simplex() {
             std::array::from_fn(|a| if a + 1 == node { 1.0 } else { 0.0 })
         } else {
-            std::array::from_fn(|a| 2.0 * CELL_CORNERS[node][a] as f64 - 1.0)
+            std::array::from_fn(|a| CORNER_SIGNS[node][a])
         }
     }
 
