@@ -64,7 +64,7 @@ pub fn run<const D: usize>(
                     recorder.frame(world, number - 1, span.time_start, points)?;
                 }
                 recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
-                let culprit = world.first_message(not_finite(points));
+                let culprit = world.first_message(update::not_finite(points));
                 let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
                 return Ok(Ending::failed(at(&format!("{why}{detail}"))));
             }
@@ -78,6 +78,11 @@ pub fn run<const D: usize>(
             row.wall_seconds = clock.elapsed();
             recorder.step(world, &row, false)?;
             let (limit, _) = limit_now(model, points);
+            before.restore(points);
+            if framed != Some(number - 1) {
+                recorder.frame(world, number - 1, span.time_start, points)?;
+            }
+            recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
             return Ok(Ending::failed(at(&format!(
                 "{why}; the time step {:.3e} s is too large (stability limit of full cells \
                  {limit:.3e} s){}",
@@ -115,18 +120,6 @@ pub fn run<const D: usize>(
         }
     }
     Ok(Ending::completed())
-}
-
-/// The first point whose state is not a number.
-fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
-    let p = (0..points.len()).find(|&p| {
-        let sound = points.velocity[p].iter().chain(&points.kirchhoff_stress[p]);
-        !sound.chain(&points.position[p]).all(|value| value.is_finite())
-    })?;
-    Some(format!(
-        "point {} at {:?} m has velocity {:?} m/s, which with its stress is not finite",
-        points.id[p], points.position[p], points.velocity[p]
-    ))
 }
 
 /// What makes a consistent mass without Ghost share unstable is not the time step.

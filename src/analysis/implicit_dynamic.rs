@@ -72,7 +72,7 @@ pub fn run<const D: usize>(
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
         // The points are as they were where a step fails.
-        let before = points.clone();
+        let before = update::Snapshot::of(points);
         let outcome = match solve_step(world, model, points, recorder, clock, span, number) {
             Ok(Ok(solved)) => {
                 let mut row = solved.row.clone();
@@ -96,7 +96,7 @@ pub fn run<const D: usize>(
         let (solved, mut row) = match outcome {
             Ok(done) => done,
             Err(fault) => {
-                *points = before;
+                before.restore(points);
                 if let Fault::Step(why) = &fault {
                     recorder.log.say(&format!("step {number} refused: {why}"));
                     if stepping.refuse() {

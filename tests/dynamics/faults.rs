@@ -49,14 +49,23 @@ fn implicit(run: Run) -> Run {
 #[test]
 fn a_time_step_over_the_limit_is_named() {
     for ranks in [1, 2] {
-        let outcome = collision().set("analysis.steps=25").ranks(ranks).attempt();
+        let run = collision().set("analysis.steps=25").set("output.checkpoint={ every = 100 }");
+        let outcome = run.ranks(ranks).attempt();
         assert_says(&outcome, 1, &["step ", "energy has grown", "time step", "stability limit"]);
-        let results = outcome.results();
+        let done = steps_done(&outcome);
+        let results = assert_keeps(outcome, done);
         assert_eq!(results.summary["status"], "failed");
-        // The rows up to the fault are there, and so is the start.
-        let done = results.count("steps_completed");
-        assert!(results.history("step").len() >= done && done >= 1);
-        assert!(results.points(0).id.len() > 1000);
+        // The row of the step that is not accepted shows what happened.
+        let kinetic = results.history("energy_kinetic");
+        assert!(kinetic.len() == done + 1 && done >= 1, "{kinetic:?}");
+        // The points are those of the last accepted row.
+        let velocity = results.points(done);
+        let speed: f64 = velocity.field("velocity").iter().map(|v| v * v).sum();
+        let mass = results.number("bodies.lower.mass") / (velocity.id.len() as f64 / 2.0);
+        let found = 0.5 * mass * speed;
+        assert!((found / kinetic[done - 1] - 1.0).abs() < 1e-9, "{found} {kinetic:?}");
+        let last = results.directory.join(format!("checkpoint-{done:06}.h5"));
+        assert!(last.exists(), "{}", last.display());
     }
 }
 
@@ -118,7 +127,7 @@ fn a_load_that_becomes_not_a_number_is_named_with_its_step_and_point() {
     for (run, fails) in [(run.clone(), 6), (implicit(run), 5)] {
         let outcome = run.attempt();
         let step = format!("step {fails} ");
-        assert_says(&outcome, 1, &[&step, "the loads on point ", " at [", "not finite"]);
+        assert_says(&outcome, 1, &[&step, "the load on point ", " at [", "not finite"]);
         let results = assert_keeps(outcome, fails - 1);
         assert!(results.history("energy_kinetic").iter().all(|w| w.is_finite()));
     }
