@@ -9,7 +9,8 @@
 use crate::deck::model::Cost;
 use crate::error::Result;
 use crate::output::RunState;
-use crate::output::summary::BalanceReport;
+use crate::output::summary::{BalanceReport, Communication};
+use crate::parallel::traffic::Traffic;
 use crate::parallel::{Partition, World, migrate};
 use crate::points::Points;
 
@@ -174,6 +175,27 @@ fn of_loads(world: &World, load: f64) -> f64 {
 /// Largest over mean number of points per rank.
 pub fn imbalance(world: &World, points: usize) -> f64 {
     of_loads(world, points as f64)
+}
+
+/// What the ranks sent in `steps` steps, and what each holds of the whole. Collective.
+pub fn communication<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    traffic: Traffic,
+    steps: usize,
+) -> Communication {
+    let per_step = 1.0 / steps.max(1) as f64;
+    let own = [traffic.messages as f64 * per_step, traffic.bytes as f64 * per_step];
+    let (largest, sum) = (world.max_slice(&own), world.sum_slice(&own));
+    let mean = |k: usize| sum[k] / world.size() as f64;
+    Communication {
+        messages_max: largest[0],
+        messages_mean: mean(0),
+        bytes_max: largest[1],
+        bytes_mean: mean(1),
+        reductions: traffic.reductions as f64 * per_step,
+        replicated_bytes: model.partition.replicated_bytes(),
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::error::Result;
 use crate::output::summary::PhaseSeconds;
-use crate::parallel::traffic;
+use crate::parallel::traffic::{self, Traffic};
 use crate::petsc::log::{Phase, Stages};
 
 /// Seconds since the start and per phase.
@@ -13,6 +13,7 @@ pub struct Clock {
     stages: Option<Stages>,
     seconds: [f64; Phase::ALL.len()],
     setup: f64,
+    setup_traffic: Traffic,
     busy: f64,
 }
 
@@ -24,6 +25,7 @@ impl Clock {
             stages,
             seconds: [0.0; Phase::ALL.len()],
             setup: 0.0,
+            setup_traffic: Traffic::default(),
             busy: 0.0,
         }
     }
@@ -31,6 +33,12 @@ impl Clock {
     /// Everything until now was set-up.
     pub fn end_setup(&mut self) {
         self.setup = self.elapsed();
+        self.setup_traffic = traffic::so_far();
+    }
+
+    /// What this rank has sent since the set-up.
+    pub fn traffic(&self) -> Traffic {
+        traffic::so_far() - self.setup_traffic
     }
 
     /// Runs `work` under a phase.

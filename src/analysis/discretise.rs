@@ -1,5 +1,6 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
+use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::internal::StepPoints;
 use crate::assembly::manufactured::Manufactured;
 use crate::assembly::numbering::Touched;
@@ -66,6 +67,27 @@ impl<const D: usize> Discretisation<D> {
     /// Maps the points onto the grid and numbers the equations. Collective.
     pub fn new(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Self> {
         Self::with_coupling(world, model, points, Coupling::Matrix)
+    }
+
+    /// The grid side of a step together with what the boundaries prescribe in it. Collective.
+    pub fn with_conditions(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        coupling: Coupling,
+        span: StepSpan,
+    ) -> Result<(Self, Conditions)> {
+        let mesh = Self::with_coupling(world, model, points, coupling)?;
+        let conditions = Conditions::evaluate(
+            world,
+            &model.grid,
+            model.deck.method.basis,
+            &mesh.numbering,
+            points,
+            &model.deck.boundaries,
+            span,
+        )?;
+        Ok((mesh, conditions))
     }
 
     /// As [`Self::new`]. Collective.

@@ -11,7 +11,7 @@ use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
 use crate::output::log::Log;
 use crate::output::progress::{NewtonReport, Progress, StepReport};
-use crate::output::summary::{BalanceReport, Count, Status};
+use crate::output::summary::{BalanceReport, Communication, Count, Status};
 use crate::output::{
     GridFrame, GridSeries, History, PointField, PointsSeries, Residuals, ResultsDirectory,
     RunState, Summary,
@@ -38,6 +38,8 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
+    /// Those of them before a restart.
+    earlier_steps: usize,
     /// Load factor and time (s) reached so far.
     pub reached: (f64, f64),
     pub versions: BTreeMap<String, String>,
@@ -135,6 +137,7 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
+            earlier_steps: 0,
             reached: (0.0, 0.0),
             versions,
             populated_cells: 0,
@@ -238,6 +241,7 @@ impl Recorder {
     fn restore(&mut self, state: &RunState) -> Result<()> {
         let count = |name: &str| state.count(name).map(|n| n as usize);
         self.steps_completed = count("recorder.steps")?;
+        self.earlier_steps = self.steps_completed;
         self.newton =
             Count { total: count("recorder.newton_total")?, max: count("recorder.newton_max")? };
         self.linear =
@@ -360,6 +364,11 @@ impl Recorder {
         self.grid.write(step, time, &frame, world.comm())
     }
 
+    /// Steps that this process has completed, without those before a restart.
+    pub fn steps_here(&self) -> usize {
+        self.steps_completed - self.earlier_steps
+    }
+
     /// Writes the summary and returns it. Collective.
     #[allow(clippy::too_many_arguments)]
     pub fn finish<const D: usize>(
@@ -368,6 +377,7 @@ impl Recorder {
         deck: &Deck,
         points: &Points<D>,
         clock: &Clock,
+        communication: Communication,
         verify: BTreeMap<String, f64>,
         ending: &Ending,
     ) -> Result<Summary> {
@@ -387,6 +397,7 @@ impl Recorder {
             peak_memory_bytes: peak_memory(world.comm()),
             imbalance: self.imbalance,
             balance: self.balance,
+            communication,
             verify,
             bodies: deck.bodies.iter().map(|body| body.name.clone()).zip(bodies).collect(),
             versions: self.versions.clone(),

@@ -88,6 +88,18 @@ pub fn reason_to_refuse<const D: usize>(
     world.first_message(reason)
 }
 
+/// The first point of this rank whose state is not a number, if any.
+pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
+    let p = (0..points.len()).find(|&p| {
+        let sound = points.velocity[p].iter().chain(&points.kirchhoff_stress[p]);
+        !sound.chain(&points.position[p]).all(|value| value.is_finite())
+    })?;
+    Some(format!(
+        "point {} at {:?} m has velocity {:?} m/s, which with its stress is not finite",
+        points.id[p], points.position[p], points.velocity[p]
+    ))
+}
+
 /// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
 /// step, if any. Collective.
 #[allow(clippy::too_many_arguments)]
@@ -173,35 +185,47 @@ pub fn deform<const D: usize>(
     sum
 }
 
-/// The state that [`deform`] and [`follow`] overwrite, to go back to where a step fails.
+/// The state that a step overwrites, to go back to where it fails.
 pub struct Snapshot<const D: usize> {
+    position: Vec<[f64; D]>,
+    velocity: Vec<[f64; D]>,
+    acceleration: Vec<[f64; D]>,
     deformation_gradient: Vec<Matrix3<f64>>,
     elastic_left_cauchy_green: Vec<Matrix3<f64>>,
     kirchhoff_stress: Vec<Matrix3<f64>>,
     plastic_strain: Vec<f64>,
     dissipation: Vec<f64>,
     half_length: Vec<[f64; D]>,
+    corners: Vec<[[f64; D]; 8]>,
 }
 
 impl<const D: usize> Snapshot<D> {
     pub fn of(points: &Points<D>) -> Self {
         Snapshot {
+            position: points.position.clone(),
+            velocity: points.velocity.clone(),
+            acceleration: points.acceleration.clone(),
             deformation_gradient: points.deformation_gradient.clone(),
             elastic_left_cauchy_green: points.elastic_left_cauchy_green.clone(),
             kirchhoff_stress: points.kirchhoff_stress.clone(),
             plastic_strain: points.plastic_strain.clone(),
             dissipation: points.dissipation.clone(),
             half_length: points.half_length.clone(),
+            corners: points.corners.clone(),
         }
     }
 
     pub fn restore(self, points: &mut Points<D>) {
+        points.position = self.position;
+        points.velocity = self.velocity;
+        points.acceleration = self.acceleration;
         points.deformation_gradient = self.deformation_gradient;
         points.elastic_left_cauchy_green = self.elastic_left_cauchy_green;
         points.kirchhoff_stress = self.kirchhoff_stress;
         points.plastic_strain = self.plastic_strain;
         points.dissipation = self.dissipation;
         points.half_length = self.half_length;
+        points.corners = self.corners;
     }
 }
 

@@ -97,6 +97,16 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     /// read where held. Returns local values, ghosts included. Collective. Error: a right-hand
     /// side that is not finite, or no convergence.
     pub fn solve(&mut self, rhs: &[f64], prescribed: &[f64]) -> Result<Vec<f64>> {
+        self.solve_from(rhs, prescribed, None)
+    }
+
+    /// [`Self::solve`] with local values `guess` near the solution, where an iteration may start.
+    pub fn solve_from(
+        &mut self,
+        rhs: &[f64],
+        prescribed: &[f64],
+        guess: Option<&[f64]>,
+    ) -> Result<Vec<f64>> {
         let owned = self.numbering.owned * D;
         let mut x = vec![0.0; self.numbering.len() * D];
         let mut moved = false;
@@ -133,7 +143,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                 }
                 b
             }
-            Method::Iterative(_) => self.conjugate_gradients(&b)?,
+            Method::Iterative(_) => self.conjugate_gradients(&b, guess)?,
             Method::Petsc(_) => self.by_petsc(&b)?,
         };
         for (dof, value) in solution.into_iter().enumerate() {
@@ -145,15 +155,24 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         Ok(x)
     }
 
-    fn conjugate_gradients(&mut self, b: &[f64]) -> Result<Vec<f64>> {
+    fn conjugate_gradients(&mut self, b: &[f64], guess: Option<&[f64]>) -> Result<Vec<f64>> {
         let Method::Iterative(jacobi) = &self.method else { return Ok(b.to_vec()) };
         let inverse = &jacobi.inverse_diagonal;
         let (world, owned) = (self.world, b.len());
         // Local: the product reads ghosts.
         let mut p = vec![0.0; self.numbering.len() * D];
         let mut product = vec![0.0; owned];
-        for (dof, b) in b.iter().enumerate() {
-            p[dof] = b * jacobi.inverse_row_sum[dof / D];
+        match guess {
+            Some(guess) => {
+                for (dof, free) in self.free.iter().enumerate() {
+                    p[dof] = if *free { guess[dof] } else { 0.0 };
+                }
+            }
+            None => {
+                for (dof, b) in b.iter().enumerate() {
+                    p[dof] = b * jacobi.inverse_row_sum[dof / D];
+                }
+            }
         }
         let mut x = p[..owned].to_vec();
         self.numbering.halo.forward(world, &mut p, D)?;

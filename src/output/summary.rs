@@ -39,6 +39,7 @@ pub struct Summary {
     /// Largest cost of a rank over the mean, at the end.
     pub imbalance: f64,
     pub balance: BalanceReport,
+    pub communication: Communication,
     /// Figures of merit of the deck's `[[verify]]`.
     pub verify: BTreeMap<String, f64>,
     pub bodies: BTreeMap<String, BodySummary>,
@@ -69,6 +70,23 @@ pub struct BalanceReport {
     pub moved_share: f64,
     /// Largest imbalance of the run.
     pub largest_imbalance: f64,
+}
+
+/// What a rank sends in a step, on average over the steps of this process, set-up not counted.
+/// Without the linear solvers, which keep their own counts (`-log_view`).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Communication {
+    /// Messages of the busiest rank, and of the average one.
+    pub messages_max: f64,
+    pub messages_mean: f64,
+    /// The same in bytes.
+    pub bytes_max: f64,
+    pub bytes_mean: f64,
+    /// Reductions, scans, broadcasts and barriers, equal on all ranks.
+    pub reductions: f64,
+    /// Bytes that every rank holds for the whole grid: the table of owners, and on a mesh its
+    /// adjacency.
+    pub replicated_bytes: usize,
 }
 
 /// Wall time by phase, s: the largest of all ranks.
@@ -157,8 +175,8 @@ mod tests {
         };
         assert_eq!(
             keys(&value),
-            "balance bodies cells_populated imbalance linear_iterations newton_iterations \
-             peak_memory_bytes points ranks reason status steps_completed steps_requested title \
+            "balance bodies cells_populated communication imbalance linear_iterations \
+             newton_iterations peak_memory_bytes points ranks reason status steps_completed steps_requested title \
              verify versions wall_seconds"
         );
         assert_eq!(value["status"], "stopped");

@@ -1,6 +1,5 @@
 //! What this rank sends and how long it waits: counted where messages are made, so that a
-//! scaling study needs no clock. The linear solvers keep their own counts
-//! ([`crate::petsc::log::traffic`]).
+//! scaling study needs no clock. The linear solvers keep their own counts (`-log_view`).
 
 use std::cell::Cell;
 use std::ops::Sub;

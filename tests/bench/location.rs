@@ -8,7 +8,6 @@
 //! points are the same on all of them: 2 per side of a square, 0.13 h off the middle of their
 //! sub-cells, so that domains of half a cell's width cross faces as they do after some steps.
 
-#[allow(dead_code, reason = "shared with the other benches")]
 mod report;
 
 use std::hint::black_box;

@@ -294,6 +294,10 @@ impl PointTable {
         PointTable { id: order.iter().map(|&row| id[row]).collect(), columns }
     }
 
+    pub fn has(&self, name: &str) -> bool {
+        self.columns.contains_key(name)
+    }
+
     /// All numbers of a field, row by row.
     pub fn field(&self, name: &str) -> &[f64] {
         let (_, values) =
