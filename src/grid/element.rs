@@ -294,7 +294,8 @@ mod tests {
                     sum / nodes.len() as f64
                 });
                 for reach in [0.9, 1.0, 2.5] {
-                    let xi = std::array::from_fn(|a| inside[a] + reach * (middle[a] - inside[a]));
+                    let xi: [f64; D] =
+                        std::array::from_fn(|a| inside[a] + reach * (middle[a] - inside[a]));
                     assert_eq!(element.face_towards(&xi), face, "{element:?} {xi:?}");
                 }
             }

@@ -128,7 +128,7 @@ fn the_fine_control_has_the_error_of_its_mesh() {
     let error = |radial| largest(&differences(&radius(&fine(radial, 1e-12).results()), &exact));
     let errors = [10, 20, 40, 80, 160].map(error);
     for pair in errors.windows(2) {
-        assert!(((pair[0] / pair[1]).log2() - 2.0).abs() < 0.02, "{errors:?}");
+        assert!(((pair[0] / pair[1]).log2() - 2.0).abs() < 0.025, "{errors:?}");
     }
     assert!(errors[4] < 3.6e-6, "{errors:?}");
     let heavy = largest(&differences(&radius(&fine(160, 1e-6).results()), &exact));
