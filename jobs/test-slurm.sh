@@ -12,13 +12,22 @@ fail() {
     exit 1
 }
 . "$(pwd)/jobs/common.sh"
-steps=${STEPS:-800}
-export LINKS=15 MACHINE=local
+export LINKS=25 MACHINE=local
+settings=(--set grid.h=0.0625 --set analysis.tolerance=1e-9 --set "output.checkpoint={every=50}")
+# So many steps that the run takes 90 s here and now: longer than a job may last.
+sh jobs/mpirun.sh 2 "$PROGRAM" tests/decks/restart.toml --out "$folder/trial" "${settings[@]}" \
+    --set analysis.steps=1000 --set output.every=1000 >"$folder/trial.log" 2>&1 &
+trial=$!
+sleep 15
+kill -TERM $trial
+wait $trial
+done_in_trial=$(($(wc -l <"$folder/trial/history.csv") - 1))
+steps=${STEPS:-$((done_in_trial * 6 + 60))}
 # Slurm counts whole minutes and looks every half minute: the warning comes at 0 to 30 s.
 export CHAIN_OPTIONS="--time=1 --signal=B:USR1@30 --output=$folder/chain-%j.log"
 first=$(sbatch --parsable --ntasks=2 $CHAIN_OPTIONS jobs/chain.sbatch tests/decks/restart.toml \
-    "$folder/out" --set "analysis.steps=$steps" --set "output.every=$steps" \
-    --set grid.h=0.0625 --set analysis.tolerance=1e-9 --set "output.checkpoint={every=50}") || fail "sbatch refused the chain"
+    "$folder/out" --set "analysis.steps=$steps" --set "output.every=$steps" "${settings[@]}") ||
+    fail "sbatch refused the chain"
 
 rows() { wc -l <"$folder/out/history.csv" 2>/dev/null || echo 0; }
 status() { sed -n 's/^  "status": "\(.*\)",$/\1/p' "$folder/out/summary.json" 2>/dev/null; }
@@ -49,6 +58,6 @@ export OUT=$folder/scaling RANKS="1 2" H=0.5
 for kind in strong weak; do
     sbatch --wait --ntasks=2 --time=5 --output="$folder/$kind.log" jobs/$kind.sbatch >/dev/null ||
         fail "$kind.sbatch failed"
-    [ -s "$OUT/$kind.csv" ] && [ -s "$OUT/$kind.svg" ] || fail "$kind.sbatch left no table"
+    [ -s "$OUT/scaling-$kind.csv" ] && [ -s "$OUT/scaling-$kind.svg" ] || fail "$kind.sbatch left no table"
 done
 echo "scaling: tables written"
