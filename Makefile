@@ -31,6 +31,7 @@ test: setup
 
 bench: setup
 	cargo bench --bench kernels
+	cargo bench --bench explicit
 
 # Writes docs/figures/iterations.csv and .svg.
 iterations: setup

@@ -1,6 +1,6 @@
 //! Explicit dynamics over all time steps (Ghost §2.3): what a run checks, records and leaves.
 
-use crate::deck::model::Mass;
+use crate::deck::model::{Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::RunState;
 use crate::parallel::World;
@@ -55,7 +55,8 @@ pub fn run<const D: usize>(
         let number = steps.number();
         let at = |why: &str| format!("step {number} (to t = {:.6e} s): {why}", span.time_end);
         // The points are as they were where a step fails.
-        let before = update::Snapshot::of(points);
+        let first = model.deck.method.stress_update == StressUpdate::Usf;
+        let before = update::Snapshot::of(points, first);
         let (mut solved, sums) = match advance(world, model, points, clock, span) {
             Ok(done) => done,
             Err(Error::Run(why)) => {

@@ -153,6 +153,29 @@ pub fn deform<const D: usize>(
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
 ) -> PointEnergies {
+    stretch(increments, points);
+    respond(materials, increments, points)
+}
+
+/// F of the increments dF alone: what [`follow`] reads.
+pub fn stretch<const D: usize>(increments: &[[[f64; D]; D]], points: &mut Points<D>) {
+    for (gradient, increment) in points.deformation_gradient.iter_mut().zip(increments) {
+        // The rows and columns beyond D are those of the identity.
+        let before = *gradient;
+        for j in 0..3 {
+            for i in 0..D {
+                gradient[(i, j)] = (0..D).map(|k| increment[i][k] * before[(k, j)]).sum();
+            }
+        }
+    }
+}
+
+/// b_e, stress and history of the increments dF; energies as [`deform`] returns them.
+pub fn respond<const D: usize>(
+    materials: &[Material],
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+) -> PointEnergies {
     let mut sum = PointEnergies::default();
     for (p, increment) in increments.iter().enumerate() {
         let start = StepStart {
@@ -162,7 +185,6 @@ pub fn deform<const D: usize>(
             volume_initial: points.volume_initial[p],
         };
         let state = mechanics::stress(&start, increment);
-        points.deformation_gradient[p] = embed(increment) * points.deformation_gradient[p];
         points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
         points.kirchhoff_stress[p] = state.kirchhoff_stress;
         points.plastic_strain[p] += state.plastic_increment;
@@ -173,35 +195,45 @@ pub fn deform<const D: usize>(
     sum
 }
 
-/// The state that [`deform`] and [`follow`] overwrite, to go back to where a step fails.
+/// The state that an explicit step may have overwritten when it fails, to go back to.
 pub struct Snapshot<const D: usize> {
     deformation_gradient: Vec<Matrix3<f64>>,
+    half_length: Vec<[f64; D]>,
+    /// Where the stress is updated before the step can fail.
+    response: Option<Response>,
+}
+
+struct Response {
     elastic_left_cauchy_green: Vec<Matrix3<f64>>,
     kirchhoff_stress: Vec<Matrix3<f64>>,
     plastic_strain: Vec<f64>,
     dissipation: Vec<f64>,
-    half_length: Vec<[f64; D]>,
 }
 
 impl<const D: usize> Snapshot<D> {
-    pub fn of(points: &Points<D>) -> Self {
+    /// `stress_first`: the stress is updated before the step can fail.
+    pub fn of(points: &Points<D>, stress_first: bool) -> Self {
         Snapshot {
             deformation_gradient: points.deformation_gradient.clone(),
-            elastic_left_cauchy_green: points.elastic_left_cauchy_green.clone(),
-            kirchhoff_stress: points.kirchhoff_stress.clone(),
-            plastic_strain: points.plastic_strain.clone(),
-            dissipation: points.dissipation.clone(),
             half_length: points.half_length.clone(),
+            response: stress_first.then(|| Response {
+                elastic_left_cauchy_green: points.elastic_left_cauchy_green.clone(),
+                kirchhoff_stress: points.kirchhoff_stress.clone(),
+                plastic_strain: points.plastic_strain.clone(),
+                dissipation: points.dissipation.clone(),
+            }),
         }
     }
 
     pub fn restore(self, points: &mut Points<D>) {
         points.deformation_gradient = self.deformation_gradient;
-        points.elastic_left_cauchy_green = self.elastic_left_cauchy_green;
-        points.kirchhoff_stress = self.kirchhoff_stress;
-        points.plastic_strain = self.plastic_strain;
-        points.dissipation = self.dissipation;
         points.half_length = self.half_length;
+        if let Some(response) = self.response {
+            points.elastic_left_cauchy_green = response.elastic_left_cauchy_green;
+            points.kirchhoff_stress = response.kirchhoff_stress;
+            points.plastic_strain = response.plastic_strain;
+            points.dissipation = response.dissipation;
+        }
     }
 }
 
@@ -216,7 +248,10 @@ pub fn follow<const D: usize>(
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
 ) -> Result<()> {
-    let whole: Vec<Matrix3<f64>> = increments.iter().map(embed).collect();
+    let whole: Vec<Matrix3<f64>> = match rule {
+        DomainUpdate::NormalIncremental => increments.iter().map(embed).collect(),
+        _ => Vec::new(),
+    };
     update_domains(grid, basis, rule, points, &whole, &|node| match numbering.local(node) {
         Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
         None => [0.0; D],
