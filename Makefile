@@ -34,6 +34,7 @@ test: setup
 bench: setup
 	cargo bench --bench kernels
 	cargo bench --bench runs
+	cargo bench --bench explicit
 
 # Writes docs/figures/iterations.csv and .svg.
 iterations: setup
