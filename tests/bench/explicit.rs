@@ -8,6 +8,7 @@
 //! over the difference of the steps is what a step costs, free of set-up and output.
 
 mod limits;
+#[allow(dead_code, reason = "the other benches time parts and memory")]
 mod report;
 
 use std::path::Path;
@@ -72,6 +73,54 @@ impl Case {
             list(cells as f64 + 0.13),
             vec![2; dimension],
         )
+    }
+
+    /// Bytes that a lumped step moves for one point, each array counted once per pass over it
+    /// (nodal arrays stay in the caches), and floating-point operations from the formulas, a
+    /// logarithm or an exponential as 20, a root or a division as one.
+    fn counted(&self) -> (f64, f64) {
+        let d = self.dimension as f64;
+        let gimp = self.basis == "gimp";
+        let nodes = if gimp { 2.5f64.powf(d) } else { 2f64.powf(d) };
+        let (tensor, plane, vector) = (72.0, 8.0 * d * d, 8.0 * d);
+        let row = nodes * (8.0 + vector) + 16.0;
+        let bytes = [
+            // kept in case the step fails; basis; groups; populated cells; weights of the nodes
+            2.0 * (tensor + vector),
+            vector * if gimp { 2.0 } else { 1.0 } + nodes * (16.0 + vector) + 8.0,
+            8.0 * nodes + 24.0,
+            vector + 4.0,
+            8.0 * nodes + 16.0,
+            // mass; momentum and force; rates and velocities; increments; their check
+            8.0 * nodes + 24.0,
+            row + tensor + vector + 16.0,
+            8.0 * nodes + 16.0 + 3.0 * vector,
+            row + plane + vector,
+            2.0 * vector + plane,
+            // F; domain; stress; position; ledger; migration
+            2.0 * tensor + plane,
+            tensor + 8.0 + vector * if gimp { 2.0 } else { 1.0 },
+            plane + 3.0 * tensor + 44.0,
+            3.0 * vector,
+            8.0 + 2.0 * vector,
+            vector + 56.0,
+        ];
+        let spectral = if d == 2.0 { 20.0 + 2.0 * 16.0 } else { 150.0 + 2.0 * 54.0 };
+        let plastic = if self.plastic { 45.0 + 60.0 } else { 0.0 };
+        let operations = [
+            // basis; momentum and force; rates and velocities; increments
+            if gimp { 20.0 * d } else { 4.0 * d } + nodes * (d * d - 1.0),
+            d + d * d + nodes * (2.0 * d + 2.0 * d * d),
+            nodes * 2.0 * d + 2.0 * d,
+            nodes * (2.0 * d * d + 2.0 * d),
+            // F; trial strain; principal axes, logarithms, stress; return; ledger
+            6.0 * d * d,
+            2.0 * d * d * d + d * d * (d + 1.0),
+            spectral + 60.0 + 25.0,
+            plastic,
+            30.0,
+        ];
+        (bytes.iter().sum(), operations.iter().sum())
     }
 
     fn run(&self, folder: &Path, steps: usize, ranks: usize) -> Used {
@@ -161,8 +210,10 @@ fn main() {
         std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let folder = tempfile::tempdir().expect("a scratch folder");
     println!("machine: {}", machine());
-    println!("triad bandwidth of one core: {:.1} GB/s", limits::triad());
-    for peak in limits::peaks() {
+    let triad = limits::triad();
+    let peaks = limits::peaks();
+    println!("triad bandwidth of one core: {triad:.1} GB/s");
+    for peak in &peaks {
         println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
     }
     if words.iter().any(|word| word == "ranks") {
@@ -181,6 +232,15 @@ fn main() {
             continue;
         }
         let cost = row(folder.path(), &case);
+        if case.mass == "lumped" {
+            let (bytes, operations) = case.counted();
+            println!(
+                "  counted: {bytes:.0} bytes = {:.0} ns at the triad, {operations:.0} operations = \
+                 {:.0} ns at the baseline peak",
+                bytes / triad,
+                operations / peaks[0].gflops
+            );
+        }
         if let Some((_, lumped)) =
             costs.iter().find(|(other, _)| *other == name.replace("consistent", "lumped"))
         {
