@@ -2,7 +2,7 @@
 //! included, beside the machine's limits.
 //!
 //! `cargo bench --bench explicit [-- WORDS]`: the cases whose names hold one of the words;
-//! `-- ranks` compares two ranks with one, in wall time, and wants an idle machine.
+//! `-- ranks` (and words) compares two ranks with one, in wall time, and wants an idle machine.
 //!
 //! Each case runs twice, with few and with more steps; the difference of the processor times
 //! over the difference of the steps is what a step costs, free of set-up and output.
@@ -159,7 +159,7 @@ impl Case {
             processor: children_seconds() - before,
             stepping: wall("total") - wall("setup"),
             phases: PHASES.map(wall),
-            iterations: summary["linear_iterations"]["total"].as_f64().unwrap_or(0.0),
+            iterations: iterations(&folder.join("out/history.csv")),
         }
     }
 }
@@ -172,6 +172,17 @@ struct Used {
     /// Wall.
     phases: [f64; PHASES.len()],
     iterations: f64,
+}
+
+/// Sum of the column `linear_iterations`.
+fn iterations(history: &Path) -> f64 {
+    let text = std::fs::read_to_string(history).expect("a history");
+    let mut lines = text.lines().map(|line| line.split(','));
+    let column = lines
+        .next()
+        .and_then(|mut titles| titles.position(|title| title.starts_with("linear_iterations")))
+        .expect("the column");
+    lines.filter_map(|mut cells| cells.nth(column)?.parse::<f64>().ok()).sum()
 }
 
 /// Processor time of all children that have ended, s.
@@ -217,7 +228,7 @@ fn main() {
         println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
     }
     if words.iter().any(|word| word == "ranks") {
-        return two_ranks(folder.path());
+        return two_ranks(folder.path(), &words);
     }
     println!(
         "\nprocessor time, {PAIRS} runs of {LONG} steps less {PAIRS} of {SHORT}; shares of wall time\n\
@@ -284,9 +295,10 @@ fn row(folder: &Path, case: &Case) -> f64 {
 }
 
 /// Wall time of the steps on one rank over that on two, in alternated pairs.
-fn two_ranks(folder: &Path) {
+fn two_ranks(folder: &Path, words: &[String]) {
     println!("\n| case | one rank over two, wall: median (least to most) |\n|---|---|");
-    for case in cases().into_iter().filter(|case| case.plastic) {
+    let named = |case: &Case| words.iter().any(|word| case.name().contains(word.as_str()));
+    for case in cases().into_iter().filter(|case| words.len() == 1 || named(case)) {
         let mut ratios = Vec::new();
         for _ in 0..PAIRS {
             let cost = |ranks: usize| {
