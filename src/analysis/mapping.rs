@@ -164,3 +164,64 @@ pub fn deformation_increments<const D: usize>(
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::basis::{self, Groups};
+    use crate::deck::model::Basis;
+    use crate::grid::{Grid, Lattice};
+    use crate::points::Points;
+
+    /// One pass gives what the formulas give one after the other.
+    #[test]
+    fn fused_passes_agree_with_the_plain_ones() {
+        let lattice = Lattice { origin: [0.0; 2], spacing: [0.5, 0.4], cells: [5, 6] };
+        let (grid, nodes) = (Grid::Lattice(lattice), 6 * 7);
+        let mut points = Points::<2>::default();
+        for k in 0..40 {
+            let t = k as f64;
+            let x = [1.2 + 0.6 * (1.3 * t).sin(), 1.1 + 0.7 * (0.7 * t).cos()];
+            points.push_unstrained(k, 0, x, 0.01 + 0.001 * t, 3.0, [0.06, 0.05]);
+            points.velocity[k as usize] = [t.cos(), 0.3 * t];
+            points.kirchhoff_stress[k as usize] =
+                Matrix3::new(t, 2.0, 0.0, 2.0, t.sin(), 0.0, 0.0, 0.0, 1.0);
+        }
+        let external: Vec<[f64; 2]> = (0..40).map(|k| [0.1 * k as f64, -1.0]).collect();
+        let field = |seed: f64| -> Vec<f64> {
+            (0..2 * nodes).map(|i| (seed + 0.37 * i as f64).sin()).collect()
+        };
+        let (acceleration, velocity) = (field(0.1), field(2.0));
+        for basis in [Basis::Mpm, Basis::Gimp] {
+            let influences = basis::map_points(&grid, basis, &points).expect("inside");
+            let groups = Groups::new(&influences);
+            let group_nodes: Vec<u32> = groups.nodes.iter().map(|&node| node as u32).collect();
+            let step = StepPoints {
+                points: &points,
+                materials: &[],
+                influences: &influences,
+                groups: &groups,
+                group_nodes: &group_nodes,
+            };
+            for external in [&external[..], &[]] {
+                let (momenta, forces) = momentum_and_force(step, external, nodes);
+                assert_eq!(momenta, momentum(step, &points.velocity, nodes));
+                assert_eq!(forces, force(step, external, &[], nodes));
+            }
+            let (a, v) = (at_points(step, &acceleration), at_points(step, &velocity));
+            for share in [1.0, 0.4, 0.0] {
+                let (rates, velocities) = push(step, &acceleration, &velocity, share, 0.01);
+                assert_eq!(rates, a);
+                for p in 0..points.len() {
+                    for i in 0..2 {
+                        let flip = points.velocity[p][i] + 0.01 * a[p][i];
+                        let mixed = share * flip + (1.0 - share) * v[p][i];
+                        assert!((velocities[p][i] - mixed).abs() < 1e-15 * (1.0 + mixed.abs()));
+                    }
+                }
+            }
+        }
+    }
+}

@@ -22,11 +22,11 @@ pub struct Lines {
     axes: Vec<Axis>,
 }
 
-/// T = L diag(pivot) L^T along the lines of one axis.
+/// T = L L^T along the lines of one axis.
 struct Axis {
     /// The node before each on its line, with the entry of L.
     before: Vec<(u32, f64)>,
-    /// 1/sqrt(pivot), 1/pivot on the last axis.
+    /// One over the diagonal of L.
     weight: Vec<f64>,
 }
 
@@ -46,14 +46,14 @@ impl Lines {
         let mut axes = Vec::new();
         if let Grid::Lattice(lattice) = grid {
             let mut stride = 1;
-            for (axis, count) in lattice.nodes().into_iter().enumerate() {
+            for count in lattice.nodes() {
                 let of_previous = |row: usize| -> Option<(usize, f64)> {
                     let node = numbering.nodes[row].checked_sub(stride)?;
                     let previous = numbering.local(node).filter(|&local| local < row)?;
                     let entry = pattern.find(numbering, row, previous)?;
                     Some((previous, matrix.values[entry] * scale[row] * scale[previous]))
                 };
-                axes.push(Axis::factor(diagonal.len(), axis + 1 == D, of_previous));
+                axes.push(Axis::factor(diagonal.len(), of_previous));
                 stride *= count;
             }
         }
@@ -64,90 +64,98 @@ impl Lines {
     pub fn apply<const D: usize>(&self, r: &[f64], free: &[bool], z: &mut [f64]) {
         let (z, _) = z[..r.len()].as_chunks_mut::<D>();
         let (r, _) = r.as_chunks::<D>();
-        let Some((last, first)) = self.axes.split_last() else {
-            for ((z, r), scale) in z.iter_mut().zip(r).zip(&self.scale) {
-                *z = r.map(|r| r * scale * scale);
-            }
-            return hold(z, free);
-        };
         for ((z, r), scale) in z.iter_mut().zip(r).zip(&self.scale) {
             *z = r.map(|r| r * scale);
         }
-        for axis in first {
+        for axis in &self.axes {
             axis.forward(z);
         }
-        last.forward(z);
-        last.backward(z, false);
-        for axis in first.iter().rev() {
-            axis.backward(z, true);
+        for axis in self.axes.iter().rev() {
+            axis.backward(z);
         }
-        for (z, scale) in z.iter_mut().zip(&self.scale) {
-            *z = z.map(|z| z * scale);
-        }
-        hold(z, free);
-    }
-}
-
-fn hold<const D: usize>(z: &mut [[f64; D]], free: &[bool]) {
-    for (z, free) in z.as_flattened_mut().iter_mut().zip(free) {
-        if !free {
-            *z = 0.0;
+        let (free, _) = free.as_chunks::<D>();
+        for ((z, scale), free) in z.iter_mut().zip(&self.scale).zip(free) {
+            for k in 0..D {
+                z[k] = if free[k] { z[k] * scale } else { 0.0 };
+            }
         }
     }
 }
 
 impl Axis {
     /// `of_previous`: the node before row r and their entry of S M S.
-    fn factor(
-        rows: usize,
-        whole: bool,
-        of_previous: impl Fn(usize) -> Option<(usize, f64)>,
-    ) -> Self {
+    fn factor(rows: usize, of_previous: impl Fn(usize) -> Option<(usize, f64)>) -> Self {
         let mut before = Vec::with_capacity(rows);
-        let mut pivots: Vec<f64> = Vec::with_capacity(rows);
+        let mut weight: Vec<f64> = Vec::with_capacity(rows);
         for row in 0..rows {
             let linked = of_previous(row).and_then(|(previous, entry)| {
-                let factor = entry / pivots[previous];
-                let pivot = 1.0 - factor * entry;
+                let factor = entry * weight[previous];
+                let pivot = 1.0 - factor * factor;
                 (pivot > LEAST_PIVOT).then_some((previous as u32, factor, pivot))
             });
             let (previous, factor, pivot) = linked.unwrap_or((NONE, 0.0, 1.0));
             before.push((previous, factor));
-            pivots.push(pivot);
+            weight.push(1.0 / pivot.sqrt());
         }
-        let weight = |pivot: f64| if whole { 1.0 / pivot } else { 1.0 / pivot.sqrt() };
-        Axis { before, weight: pivots.into_iter().map(weight).collect() }
+        Axis { before, weight }
     }
 
-    /// z = weight L^-1 z
+    /// z = L^-1 z
     fn forward<const D: usize>(&self, z: &mut [[f64; D]]) {
-        for (row, &(previous, factor)) in self.before.iter().enumerate() {
+        for (row, (&(previous, factor), weight)) in self.before.iter().zip(&self.weight).enumerate()
+        {
+            let mut sum = z[row];
             if previous != NONE {
                 let carried = z[previous as usize];
                 for k in 0..D {
-                    z[row][k] -= factor * carried[k];
+                    sum[k] -= factor * carried[k];
                 }
             }
-        }
-        for (z, weight) in z.iter_mut().zip(&self.weight) {
-            *z = z.map(|z| z * weight);
+            z[row] = sum.map(|sum| sum * weight);
         }
     }
 
-    /// z = L^-T z, of weight z where `weighted`.
-    fn backward<const D: usize>(&self, z: &mut [[f64; D]], weighted: bool) {
-        if weighted {
-            for (z, weight) in z.iter_mut().zip(&self.weight) {
-                *z = z.map(|z| z * weight);
-            }
-        }
-        for (row, &(previous, factor)) in self.before.iter().enumerate().rev() {
+    /// z = L^-T z
+    fn backward<const D: usize>(&self, z: &mut [[f64; D]]) {
+        for (row, (&(previous, factor), weight)) in
+            self.before.iter().zip(&self.weight).enumerate().rev()
+        {
+            let solved = z[row].map(|z| z * weight);
+            z[row] = solved;
             if previous != NONE {
-                let carried = z[row];
+                let target = &mut z[previous as usize];
                 for k in 0..D {
-                    z[previous as usize][k] -= factor * carried[k];
+                    target[k] -= factor * solved[k];
                 }
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Axis, NONE};
+
+    #[test]
+    fn sweeps_invert_the_tridiagonal_lines() {
+        // Two lines of three and two nodes, interleaved; one coupling too strong is dropped.
+        let links = [None, None, Some((0, 0.3)), Some((1, -0.4)), Some((2, 0.45)), Some((3, 0.99))];
+        let axis = Axis::factor(links.len(), |row| links[row]);
+        assert_eq!(axis.before[5].0, NONE);
+        let x: Vec<[f64; 2]> = (0..6).map(|i| [1.0 + i as f64, (i as f64).cos()]).collect();
+        let mut z = x.clone();
+        for (row, link) in links.iter().enumerate().take(5) {
+            if let Some((previous, entry)) = link {
+                for k in 0..2 {
+                    z[row][k] += entry * x[*previous][k];
+                    z[*previous][k] += entry * x[row][k];
+                }
+            }
+        }
+        axis.forward(&mut z);
+        axis.backward(&mut z);
+        for (z, x) in z.as_flattened().iter().zip(x.as_flattened()) {
+            assert!((z - x).abs() < 1e-14, "{z} {x}");
         }
     }
 }

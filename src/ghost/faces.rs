@@ -33,6 +33,58 @@ struct Cell {
     bridge: u64,
 }
 
+/// The cells of this rank, in their order, and those of others that are known.
+struct Cells {
+    first: usize,
+    /// Place in `own` of the cells from `first` on; empty where they lie far apart.
+    table: Vec<u32>,
+    numbers: Vec<usize>,
+    /// The populated ones.
+    own: Vec<Cell>,
+    /// Those of other ranks, and empty ones of this rank.
+    others: FxHashMap<usize, Cell>,
+}
+
+impl Cells {
+    fn new(populated: &[(usize, u64)]) -> Self {
+        let first = populated.first().map_or(0, |own| own.0);
+        let range = populated.last().map_or(0, |own| own.0 + 1 - first);
+        let mut table = Vec::new();
+        if range / 16 <= populated.len() {
+            table.resize(range, u32::MAX);
+            for (at, (cell, _)) in populated.iter().enumerate() {
+                table[cell - first] = at as u32;
+            }
+        }
+        let own =
+            populated.iter().map(|own| Cell { populated: own.1, ..Cell::default() }).collect();
+        let numbers = populated.iter().map(|own| own.0).collect();
+        Cells { first, table, numbers, own, others: FxHashMap::default() }
+    }
+
+    #[inline]
+    fn get(&self, cell: usize) -> Option<&Cell> {
+        self.place(cell).map(|at| &self.own[at]).or_else(|| self.others.get(&cell))
+    }
+
+    fn entry(&mut self, cell: usize) -> &mut Cell {
+        match self.place(cell) {
+            Some(at) => &mut self.own[at],
+            None => self.others.entry(cell).or_default(),
+        }
+    }
+
+    /// Index of a populated cell of this rank.
+    #[inline]
+    fn place(&self, cell: usize) -> Option<usize> {
+        if self.table.is_empty() {
+            return self.numbers.binary_search(&cell).ok();
+        }
+        let place = self.table.get(cell.wrapping_sub(self.first));
+        place.filter(|&&at| at != u32::MAX).map(|&at| at as usize)
+    }
+}
+
 /// Finds the boundary faces whose lower cell this rank owns, in ascending order.
 ///
 /// `populated` lists the populated cells this rank owns, each with the bits of its bodies, in
@@ -44,26 +96,22 @@ pub fn boundary_faces<const D: usize>(
     partition: &Partition<D>,
     populated: &[(usize, u64)],
 ) -> Result<Vec<BoundaryFace>> {
-    let mut cells: FxHashMap<usize, Cell> = populated
-        .iter()
-        .map(|&(cell, bodies)| (cell, Cell { populated: bodies, ..Cell::default() }))
-        .collect();
+    let mut cells = Cells::new(populated);
     let mut owned: Vec<usize> = populated.iter().map(|&(cell, _)| cell).collect();
     share_border_cells(world, grid, partition, &owned, &mut cells)?;
 
     let mut neighbours = Vec::new();
-    for &(cell, bodies) in populated {
+    for (at, &(cell, bodies)) in populated.iter().enumerate() {
         neighbours.clear();
         grid.face_neighbours(cell, &mut neighbours);
         let everywhere = neighbours
             .iter()
-            .fold(u64::MAX, |all, n| all & cells.get(n).map_or(0, |cell| cell.populated));
-        cells.get_mut(&cell).expect("own cells were inserted above").boundary =
-            bodies & !everywhere;
+            .fold(u64::MAX, |all, &n| all & cells.get(n).map_or(0, |cell| cell.populated));
+        cells.own[at].boundary = bodies & !everywhere;
     }
     if grid.element().is_simplex() {
         for (cell, bodies) in bridges(world, grid, partition, &cells) {
-            cells.entry(cell).or_default().bridge = bodies;
+            cells.entry(cell).bridge = bodies;
             owned.push(cell);
         }
         owned.sort_unstable();
@@ -73,12 +121,12 @@ pub fn boundary_faces<const D: usize>(
 
     let mut faces = Vec::new();
     for &cell in &owned {
-        let this = cells[&cell];
+        let Some(&this) = cells.get(cell) else { continue };
         neighbours.clear();
         grid.face_neighbours(cell, &mut neighbours);
         neighbours.sort_unstable();
         for &other_cell in neighbours.iter().filter(|&&n| n > cell) {
-            let Some(other) = cells.get(&other_cell) else { continue };
+            let Some(other) = cells.get(other_cell) else { continue };
             // One of the two is a boundary cell, hence populated.
             let united = (this.populated | this.bridge)
                 & (other.populated | other.bridge)
@@ -100,18 +148,18 @@ fn bridges<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,
-    cells: &FxHashMap<usize, Cell>,
+    cells: &Cells,
 ) -> Vec<(usize, u64)> {
     let here = world.rank();
     let mut candidates = Vec::new();
-    for &cell in cells.keys() {
+    for &cell in cells.numbers.iter().chain(cells.others.keys()) {
         grid.face_neighbours(cell, &mut candidates);
     }
     candidates.sort_unstable();
     candidates.dedup();
     let mut neighbours = Vec::new();
     candidates.retain(|&cell| partition.owner_of_cell(grid, cell) == here);
-    let populated = |cell: &usize| cells.get(cell).map_or(0, |cell| cell.populated);
+    let populated = |cell: &usize| cells.get(*cell).map_or(0, |cell| cell.populated);
     let bridge = |cell: usize| {
         neighbours.clear();
         grid.face_neighbours(cell, &mut neighbours);
@@ -131,7 +179,7 @@ fn share_border_cells<const D: usize>(
     grid: &Grid<D>,
     partition: &Partition<D>,
     owned: &[usize],
-    cells: &mut FxHashMap<usize, Cell>,
+    cells: &mut Cells,
 ) -> Result<()> {
     let here = world.rank();
     if world.size() == 1 {
@@ -150,7 +198,7 @@ fn share_border_cells<const D: usize>(
         }
         ranks.sort_unstable();
         ranks.dedup();
-        let state = cells[&cell];
+        let state = cells.get(cell).copied().unwrap_or_default();
         for &rank in ranks.iter().filter(|&&rank| rank != here) {
             outgoing.entry(rank).or_default().extend([
                 cell as u64,
@@ -163,7 +211,7 @@ fn share_border_cells<const D: usize>(
     for (_, words) in exchange(world, outgoing.into_iter().collect())? {
         for record in words.chunks_exact(4) {
             let state = Cell { populated: record[1], boundary: record[2], bridge: record[3] };
-            cells.insert(record[0] as usize, state);
+            cells.others.insert(record[0] as usize, state);
         }
     }
     Ok(())

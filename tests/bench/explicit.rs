@@ -2,12 +2,13 @@
 //! included, beside the machine's limits.
 //!
 //! `cargo bench --bench explicit [-- WORDS]`: the cases whose names hold one of the words;
-//! `-- ranks` compares two ranks with one, in wall time, and wants an idle machine.
+//! `-- ranks` (and words) compares two ranks with one, in wall time, and wants an idle machine.
 //!
 //! Each case runs twice, with few and with more steps; the difference of the processor times
 //! over the difference of the steps is what a step costs, free of set-up and output.
 
 mod limits;
+#[allow(dead_code, reason = "the other benches time parts and memory")]
 mod report;
 
 use std::path::Path;
@@ -74,6 +75,54 @@ impl Case {
         )
     }
 
+    /// Bytes that a lumped step moves for one point, each array counted once per pass over it
+    /// (nodal arrays stay in the caches), and floating-point operations from the formulas, a
+    /// logarithm or an exponential as 20, a root or a division as one.
+    fn counted(&self) -> (f64, f64) {
+        let d = self.dimension as f64;
+        let gimp = self.basis == "gimp";
+        let nodes = if gimp { 2.5f64.powf(d) } else { 2f64.powf(d) };
+        let (tensor, plane, vector) = (72.0, 8.0 * d * d, 8.0 * d);
+        let row = nodes * (8.0 + vector) + 16.0;
+        let bytes = [
+            // kept in case the step fails; basis; groups; populated cells; weights of the nodes
+            2.0 * (tensor + vector),
+            vector * if gimp { 2.0 } else { 1.0 } + nodes * (16.0 + vector) + 8.0,
+            8.0 * nodes + 24.0,
+            vector + 4.0,
+            8.0 * nodes + 16.0,
+            // mass; momentum and force; rates and velocities; increments; their check
+            8.0 * nodes + 24.0,
+            row + tensor + vector + 16.0,
+            8.0 * nodes + 16.0 + 3.0 * vector,
+            row + plane + vector,
+            2.0 * vector + plane,
+            // F; domain; stress; position; ledger; migration
+            2.0 * tensor + plane,
+            tensor + 8.0 + vector * if gimp { 2.0 } else { 1.0 },
+            plane + 3.0 * tensor + 44.0,
+            3.0 * vector,
+            8.0 + 2.0 * vector,
+            vector + 56.0,
+        ];
+        let spectral = if d == 2.0 { 20.0 + 2.0 * 16.0 } else { 150.0 + 2.0 * 54.0 };
+        let plastic = if self.plastic { 45.0 + 60.0 } else { 0.0 };
+        let operations = [
+            // basis; momentum and force; rates and velocities; increments
+            if gimp { 20.0 * d } else { 4.0 * d } + nodes * (d * d - 1.0),
+            d + d * d + nodes * (2.0 * d + 2.0 * d * d),
+            nodes * 2.0 * d + 2.0 * d,
+            nodes * (2.0 * d * d + 2.0 * d),
+            // F; trial strain; principal axes, logarithms, stress; return; ledger
+            6.0 * d * d,
+            2.0 * d * d * d + d * d * (d + 1.0),
+            spectral + 60.0 + 25.0,
+            plastic,
+            30.0,
+        ];
+        (bytes.iter().sum(), operations.iter().sum())
+    }
+
     fn run(&self, folder: &Path, steps: usize, ranks: usize) -> Used {
         std::fs::write(folder.join("case.toml"), self.deck(steps)).expect("a scratch folder");
         let program = env!("CARGO_BIN_EXE_mpm-par");
@@ -110,7 +159,7 @@ impl Case {
             processor: children_seconds() - before,
             stepping: wall("total") - wall("setup"),
             phases: PHASES.map(wall),
-            iterations: summary["linear_iterations"]["total"].as_f64().unwrap_or(0.0),
+            iterations: iterations(&folder.join("out/history.csv")),
         }
     }
 }
@@ -123,6 +172,17 @@ struct Used {
     /// Wall.
     phases: [f64; PHASES.len()],
     iterations: f64,
+}
+
+/// Sum of the column `linear_iterations`.
+fn iterations(history: &Path) -> f64 {
+    let text = std::fs::read_to_string(history).expect("a history");
+    let mut lines = text.lines().map(|line| line.split(','));
+    let column = lines
+        .next()
+        .and_then(|mut titles| titles.position(|title| title.starts_with("linear_iterations")))
+        .expect("the column");
+    lines.filter_map(|mut cells| cells.nth(column)?.parse::<f64>().ok()).sum()
 }
 
 /// Processor time of all children that have ended, s.
@@ -161,12 +221,14 @@ fn main() {
         std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let folder = tempfile::tempdir().expect("a scratch folder");
     println!("machine: {}", machine());
-    println!("triad bandwidth of one core: {:.1} GB/s", limits::triad());
-    for peak in limits::peaks() {
+    let triad = limits::triad();
+    let peaks = limits::peaks();
+    println!("triad bandwidth of one core: {triad:.1} GB/s");
+    for peak in &peaks {
         println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
     }
     if words.iter().any(|word| word == "ranks") {
-        return two_ranks(folder.path());
+        return two_ranks(folder.path(), &words);
     }
     println!(
         "\nprocessor time, {PAIRS} runs of {LONG} steps less {PAIRS} of {SHORT}; shares of wall time\n\
@@ -181,6 +243,15 @@ fn main() {
             continue;
         }
         let cost = row(folder.path(), &case);
+        if case.mass == "lumped" {
+            let (bytes, operations) = case.counted();
+            println!(
+                "  counted: {bytes:.0} bytes = {:.0} ns at the triad, {operations:.0} operations = \
+                 {:.0} ns at the baseline peak",
+                bytes / triad,
+                operations / peaks[0].gflops
+            );
+        }
         if let Some((_, lumped)) =
             costs.iter().find(|(other, _)| *other == name.replace("consistent", "lumped"))
         {
@@ -224,9 +295,10 @@ fn row(folder: &Path, case: &Case) -> f64 {
 }
 
 /// Wall time of the steps on one rank over that on two, in alternated pairs.
-fn two_ranks(folder: &Path) {
+fn two_ranks(folder: &Path, words: &[String]) {
     println!("\n| case | one rank over two, wall: median (least to most) |\n|---|---|");
-    for case in cases().into_iter().filter(|case| case.plastic) {
+    let named = |case: &Case| words.iter().any(|word| case.name().contains(word.as_str()));
+    for case in cases().into_iter().filter(|case| words.len() == 1 || named(case)) {
         let mut ratios = Vec::new();
         for _ in 0..PAIRS {
             let cost = |ranks: usize| {
