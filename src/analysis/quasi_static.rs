@@ -18,7 +18,7 @@ use crate::points::Points;
 use super::balance::{self, imbalance};
 use super::checkpointing::Moment;
 use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
+use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
@@ -170,17 +170,7 @@ fn solve_step<const D: usize>(
 ) -> Result<std::result::Result<Solved<D>, String>> {
     let deck = &model.deck;
     let (mesh, conditions) = clock.time(Phase::Locate, || {
-        let mesh = Discretisation::new(world, model, points)?;
-        let conditions = Conditions::evaluate(
-            world,
-            &model.grid,
-            deck.method.basis,
-            &mesh.numbering,
-            points,
-            &deck.boundaries,
-            span,
-        )?;
-        Ok((mesh, conditions))
+        Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
     })?;
     let numbering = &mesh.numbering;
     let external = |factor: f64, time: f64| -> Result<Vec<f64>> {

@@ -3,7 +3,7 @@
 
 use nalgebra::DMatrix;
 
-use crate::assembly::conditions::{Conditions, StepSpan};
+use crate::assembly::conditions::StepSpan;
 use crate::error::{Error, Result};
 use crate::parallel::World;
 use crate::points::Points;
@@ -24,16 +24,8 @@ pub fn require<const D: usize>(
     first: StepSpan,
 ) -> Result<()> {
     let (deck, grid) = (&model.deck, &model.grid);
-    let mesh = Discretisation::with_coupling(world, model, points, Coupling::Diagonal)?;
-    let conditions = Conditions::evaluate(
-        world,
-        grid,
-        deck.method.basis,
-        &mesh.numbering,
-        points,
-        &deck.boundaries,
-        first,
-    )?;
+    let (mesh, conditions) =
+        Discretisation::with_conditions(world, model, points, Coupling::Diagonal, first)?;
     let bodies = deck.bodies.len();
     let touched = touched_nodes(world, &mesh, points, bodies)?;
     let groups = sharing(world, &touched, bodies);
