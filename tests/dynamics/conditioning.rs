@@ -149,6 +149,11 @@ fn figure_10_at_all_positions() {
     record("ghost-10", &["", "stabilised, printed", "stabilised, here", "plain, here"], &rows);
 }
 
+/// Only its being out of reach has a meaning.
+fn beyond(kappa: f64) -> String {
+    if kappa > 1.0 / f64::EPSILON { "beyond 1/eps".into() } else { format!("{kappa:.0e}") }
+}
+
 /// gimp at all 1000 positions: Table 2, Figures 9 and 10.
 #[test]
 #[ignore = "6 runs, several minutes; writes the table"]
@@ -161,21 +166,27 @@ fn table_2() {
     ] {
         let run = ghost(&resolution, 1000).results();
         let kappa = largest(&run, "kappa_mass_ghost", 2.0);
-        let weak = ghost(&resolution, 1000).set("ghost.mass_factor=0.025").results();
-        let weak = largest(&weak, "kappa_mass_ghost", 2.0);
+        // The place of the largest one again, with a tenth of gamma_M.
+        let all = run.history("kappa_mass_ghost");
+        let at = all.iter().position(|k| *k == kappa).expect("it is one of them");
+        let moved = 0.5 * (at + 1) as f64 / 1000.0;
+        let weak = ghost(&resolution, 1)
+            .set("ghost.mass_factor=0.025")
+            .set(format!("conditioning.displacement=[{moved:?}, {moved:?}]"));
+        let ratio = weak.results().history("kappa_mass_ghost")[0] / kappa;
         let velocity = run.history("velocity_error_ghost").into_iter().fold(0.0, f64::max);
         let kappa_lumped = largest(&run, "kappa_mass_lumped", 2.0);
         let kappa_plain = largest(&run, "kappa_mass", 2.0);
         rows.push(vec![
             resolution.name.into(),
             format!("{stabilised:.2e} / {kappa:.2e}"),
-            format!("{weak:.2e} ({:.2})", weak / kappa),
-            format!("{plain} / {kappa_plain:.0e}"),
+            format!("{ratio:.2}"),
+            format!("{plain} / {}", beyond(kappa_plain)),
             format!("{lumped} / {kappa_lumped:.2e}"),
             format!("{velocity:.1e}"),
         ]);
         assert!(kappa > stabilised / 2.0 && kappa < stabilised * 2.0, "{kappa} {stabilised}");
-        assert!((9.0..11.0).contains(&(weak / kappa)), "{weak} {kappa}");
+        assert!((9.0..11.0).contains(&ratio), "{ratio}");
         assert!(kappa_plain > 1e12, "{kappa_plain}");
         assert!(kappa_lumped > 1e6, "{kappa_lumped}");
         assert!(velocity < 1e-11, "{velocity:e}");
@@ -183,7 +194,7 @@ fn table_2() {
     let header = [
         "points",
         "stabilised: printed / here",
-        "a tenth of gamma_M (ratio)",
+        "a tenth of gamma_M: times",
         "plain: printed / here",
         "lumped: printed / here",
         "velocity error, stabilised",
