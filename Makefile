@@ -1,5 +1,5 @@
 # Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
-.PHONY: help setup build run test bench iterations docs validate lint clean
+.PHONY: help setup build run test bench iterations scaling compare docs validate lint clean
 
 RANKS ?= 2
 DECK  ?= inputs/beam.toml
@@ -11,6 +11,8 @@ help:
 	@echo "make lint      format and clippy, warnings are errors"
 	@echo "make bench     time the parts of a step beside the machine's limits"
 	@echo "make iterations  linear iterations on a curved body: table and figure (long)"
+	@echo "make scaling   strong and weak scaling: timed on this machine's cores, counted to 64 ranks"
+	@echo "make compare   KratosMPMApplication beside this program, in turn (network, minutes)"
 	@echo "make validate  the longer tests: decks with published numbers"
 	@echo "make docs      the code's own documentation"
 	@echo "make setup     install the Debian packages that are missing"
@@ -32,15 +34,23 @@ test: setup
 bench: setup
 	cargo bench --bench kernels
 	cargo bench --bench runs
+	cargo bench --bench explicit
 
 # Writes docs/figures/iterations.csv and .svg.
 iterations: setup
 	cargo bench --bench iterations
 
-# Every deck with a published number, the long ones too; rewrites the tables of docs/validation.md.
+# Writes docs/figures/scaling-*.csv and .svg; jobs/scaling.py has the parts.
+scaling: build
+	python3 jobs/scaling.py all
+
+# Installs KratosMPMApplication from PyPI in target/compare/venv; prints the table of docs/compare.md.
+compare: build
+	python3 jobs/compare.py
+
+# Every deck with a published number, the long ones too; rewrites the tables of docs/validation*.md.
 validate: setup
-	MPM_PAR_VALIDATION=1 cargo test --release --test quasi_static -- --include-ignored
-	cargo test --release -- --ignored
+	MPM_PAR_VALIDATION=1 cargo test --release --no-fail-fast -- --include-ignored
 
 docs: setup
 	cargo doc --no-deps

@@ -20,7 +20,22 @@ if [ "$ranks" -gt "$cores" ]; then
     # Waiting ranks give way to working ones.
     export OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
 fi
-# After SIGTERM a rank may finish its step and write a checkpoint before it is killed, s.
-export OMPI_MCA_odls_base_sigkill_timeout="${OMPI_MCA_odls_base_sigkill_timeout:-60}"
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}"
-exec mpirun -n "$ranks" "$@"
+
+# mpirun answers SIGTERM and Ctrl-C by killing the ranks a second later. SIGUSR1 it hands on: the
+# program writes a checkpoint after its step and stops. So the first signal becomes that one, and
+# only the next is meant as it is. In a session of its own Ctrl-C does not reach mpirun first.
+own=
+command -v setsid >/dev/null 2>&1 && own=setsid
+$own mpirun -n "$ranks" "$@" &
+job=$!
+trap 'kill -USR1 "$job" 2>/dev/null' USR1
+trap 'kill -USR1 "$job" 2>/dev/null; trap "kill -TERM $job 2>/dev/null" TERM INT HUP' TERM INT HUP
+# A signal ends the wait, not the job.
+code=0
+wait "$job" || code=$?
+while kill -0 "$job" 2>/dev/null; do
+    code=0
+    wait "$job" || code=$?
+done
+exit "$code"

@@ -57,12 +57,30 @@ if ! munge -n >/dev/null 2>&1; then
     runuser -u munge -- munged --force >"$folder/munged.log" 2>&1 || cannot "munged does not start"
     munge_pid=/run/munge/munged.pid
 fi
+# However this ends, nothing of it is left: jobs first, then the daemons.
 stop() {
-    for pid in "$folder/slurmd.pid" "$folder/slurmctld.pid" $munge_pid; do
-        [ -f "$pid" ] && kill "$(cat "$pid")" 2>/dev/null
+    trap - EXIT
+    if sinfo -h >/dev/null 2>&1; then
+        scancel --user="$(id -un)" --full --signal=KILL 2>/dev/null
+        scancel --user="$(id -un)" 2>/dev/null
+        for _ in $(seq 40); do
+            [ -n "$(squeue -h 2>/dev/null)" ] || break
+            sleep 0.5
+        done
+    fi
+    for file in "$folder/slurmd.pid" "$folder/slurmctld.pid" $munge_pid; do
+        [ -f "$file" ] || continue
+        pid=$(cat "$file")
+        kill "$pid" 2>/dev/null
+        for _ in $(seq 40); do
+            kill -0 "$pid" 2>/dev/null || break
+            sleep 0.25
+        done
+        kill -9 "$pid" 2>/dev/null
     done
 }
 trap stop EXIT
+trap 'exit 143' TERM INT HUP
 slurmctld >"$folder/start.log" 2>&1 && slurmd >>"$folder/start.log" 2>&1 ||
     cannot "it does not start: $(tail -n 2 "$folder/start.log")"
 for _ in $(seq 60); do
@@ -70,4 +88,6 @@ for _ in $(seq 60); do
     sleep 0.5
 done
 [ "$(sinfo -h -o %T)" = idle ] || cannot "the node does not come up: $(tail -n 2 "$folder/slurmd.log")"
-"$@"
+# In the background, so that a signal ends the wait at once.
+"$@" &
+wait $!

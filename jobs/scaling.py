@@ -1,15 +1,21 @@
 #!/usr/bin/env python3
-"""Strong and weak scaling of inputs/scaling.toml: tables (csv) and plots (svg).
+"""Strong, weak and size scaling of inputs/scaling.toml: tables (csv) and plots (svg).
 
-scaling.py strong|weak --ranks 1 2 4 [--h 0.125] [--out out/scaling] [--repeat 3]
+scaling.py strong|weak|sizes|all [--ranks 1 2 4] [--h 0.03125] [--out docs/figures] [--repeat 3]
+
+strong: one problem on more ranks. weak: as many points per rank, by finer cells. sizes: one rank
+count, finer cells. Each with Ghost stabilisation and, where --bare asks for it, without.
 
 Times are medians. On more ranks than the machine has cores a time says nothing about the
 program: such rows keep their counts (messages, bytes, reductions, rows, iterations), and their
-times are left empty. Needs Python's standard library only.
+times are left empty. `all` runs each pair of ranks and cell size once and uses it wherever it is
+needed; what it has measured is kept in --work, and --resume goes on from there. Needs Python's
+standard library only.
 """
 import argparse
 import csv
 import json
+import math
 import os
 import re
 import statistics
@@ -20,8 +26,12 @@ ROOT = os.environ.get("ROOT") or os.path.dirname(os.path.dirname(os.path.abspath
 PROGRAM = os.environ.get("PROGRAM") or os.path.join(ROOT, "target/release/mpm-par")
 MACHINE = os.environ.get("MACHINE", "local")
 PHASES = ["setup", "locate", "assemble", "solve", "update", "migrate", "output"]
-COUNTS = ["points", "steps", "newton", "linear", "messages_max", "messages_mean", "bytes_max",
-          "bytes_mean", "reductions", "memory_max", "imbalance"]
+COUNTS = ["h", "ghost", "points", "rows", "steps", "newton", "linear", "per_solve",
+          "messages_max", "messages_mean", "bytes_max", "bytes_mean", "reductions",
+          "own_messages_max", "own_bytes_max", "own_reductions", "replicated_bytes",
+          "memory_max", "memory_mean", "imbalance"]
+# Steps in 8 m: a whole number of cells along 9 m and 5 m needs a multiple of 8.
+WIDTH, UNIT = 8.0, 8
 
 
 def cores():
@@ -31,28 +41,33 @@ def cores():
     return min(len(lines) or 1, len(os.sched_getaffinity(0)))
 
 
-def sizes(kind, ranks, h):
-    """--set words for this rank count. Weak: the block is as many times wider as ranks."""
-    if kind == "strong":
-        return [f"grid.h={h}"]
-    width = 4 * ranks
-    return [f"grid.h={h}", f"grid.size=[{width + 1}.0, 5.0]",
-            f"body.0.shape={{ box = {{ min = [0, 0], max = [{width}, 4] }} }}"]
+def finer(h, times):
+    """The cell size with about `times` as many cells in the plane."""
+    cells = WIDTH / h * math.sqrt(times)
+    return WIDTH / (UNIT * max(1, round(cells / UNIT)))
 
 
-def run(kind, ranks, h, out, more):
-    """One run; its summary and what the linear solver's log says about messages."""
+def run(ranks, h, ghost, out, more, patience):
+    """One run; its summary and what the linear solver's log says, or None if it failed."""
     words = [PROGRAM, os.path.join(ROOT, "inputs/scaling.toml"), "--out", out, "--force"]
-    for size in sizes(kind, ranks, h) + more:
-        words += ["--set", size]
+    settings = [f"grid.h={h!r}"] + ([] if ghost else ["ghost="]) + more
+    for setting in settings:
+        words += ["--set", setting]
     log = out + ".log_view"
     words += ["-log_view", ":" + log]
     script = '. "$ROOT/jobs/machines/$MACHINE.sh"; launch "$@"'
     env = dict(os.environ, ROOT=ROOT, MACHINE=MACHINE)
-    done = subprocess.run(["bash", "-c", script, "bash", str(ranks)] + words, env=env,
+    for old in (log, os.path.join(out, "summary.json")):
+        if os.path.exists(old):
+            os.remove(old)
+    start = ["timeout", str(patience)] if patience else []
+    done = subprocess.run(start + ["bash", "-c", script, "bash", str(ranks)] + words, env=env,
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
     if done.returncode:
-        sys.exit(f"{ranks} ranks failed:\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}")
+        reason = [line for line in (done.stdout + done.stderr).splitlines() if "error:" in line]
+        print(f"{ranks} ranks, h = {h:g}, Ghost {ghost}: exit code {done.returncode} "
+              f"{reason[:1]}", flush=True)
+        return None
     with open(os.path.join(out, "summary.json")) as file:
         summary = json.load(file)
     with open(log) as file:
@@ -68,31 +83,45 @@ def logged(text, name):
     return largest, float(found.group(3)) if found.group(3) else largest
 
 
-def row_of(kind, ranks, h, out, repeat, more, limit):
+def row_of(ranks, h, ghost, out, repeat, more, limit, patience):
     """A table row: counts of the first run, medians of the times of all."""
-    runs = [run(kind, ranks, h, os.path.join(out, f"{kind}-{ranks}"), more)
+    folder = os.path.join(out, f"{'ghost' if ghost else 'bare'}-{ranks}-{WIDTH / h:.0f}")
+    runs = [run(ranks, h, ghost, folder, more, patience)
             for _ in range(repeat if ranks <= limit else 1)]
+    if any(one is None for one in runs):
+        return {"ranks": ranks, "h": h, "ghost": int(ghost)}
     summary, log = runs[0]
     steps = summary["steps_completed"]
     # PETSc counts its own messages and bytes; those of the program itself come on top.
-    own = summary.get("communication", {})
+    own = summary["communication"]
     messages = logged(log, "MPI Msg Count")
     length = re.search(r"^MPI Msg Len \(bytes\):\s+(\S+)\s+\S+\s+\S+\s+(\S+)", log, re.M)
     bytes_ = (float(length.group(1)), float(length.group(2)) / ranks) if length else (0.0, 0.0)
-    reductions = logged(log, "MPI Reductions")
-    add = lambda key: own.get(key, 0.0)
+    reductions = logged(log, "MPI Reductions")[0]
+    newton = summary["newton_iterations"]["total"]
+    linear = summary["linear_iterations"]["total"]
+    memory = summary["peak_memory_bytes"]
+    nodes = re.search(r"(\d+) equations", open(os.path.join(folder, "log.txt")).read())
     row = {
-        "ranks": ranks,
+        "ranks": ranks, "h": h, "ghost": int(ghost),
         "points": summary["points"],
+        "rows": int(nodes.group(1)) if nodes else 0,
         "steps": steps,
-        "newton": summary["newton_iterations"]["total"],
-        "linear": summary["linear_iterations"]["total"],
-        "messages_max": messages[0] / steps + add("messages_max"),
-        "messages_mean": messages[1] / steps + add("messages_mean"),
-        "bytes_max": bytes_[0] / steps + add("bytes_max"),
-        "bytes_mean": bytes_[1] / steps + add("bytes_mean"),
-        "reductions": reductions[0] / steps + add("reductions"),
-        "memory_max": summary["peak_memory_bytes"]["max"],
+        "newton": newton,
+        "linear": linear,
+        # A step's first evaluation solves nothing.
+        "per_solve": linear / max(1, newton - steps),
+        "messages_max": messages[0] / steps + own["messages_max"],
+        "messages_mean": messages[1] / steps + own["messages_mean"],
+        "bytes_max": bytes_[0] / steps + own["bytes_max"],
+        "bytes_mean": bytes_[1] / steps + own["bytes_mean"],
+        "reductions": reductions / steps + own["reductions"],
+        "own_messages_max": own["messages_max"],
+        "own_bytes_max": own["bytes_max"],
+        "own_reductions": own["reductions"],
+        "replicated_bytes": own["replicated_bytes"],
+        "memory_max": memory["max"],
+        "memory_mean": memory["sum"] / ranks,
         "imbalance": summary["imbalance"],
     }
     if ranks <= limit:
@@ -100,6 +129,15 @@ def row_of(kind, ranks, h, out, repeat, more, limit):
             times = [summary["wall_seconds"][phase] for summary, _ in runs]
             row[phase] = statistics.median(times)
     return row
+
+
+def exponent(pairs):
+    """Slope of log y over log x by least squares."""
+    pairs = [(math.log(x), math.log(y)) for x, y in pairs if x > 0 and y > 0]
+    if len(pairs) < 2:
+        return float("nan")
+    mx, my = (sum(p[k] for p in pairs) / len(pairs) for k in (0, 1))
+    return sum((x - mx) * (y - my) for x, y in pairs) / sum((x - mx) ** 2 for x, _ in pairs)
 
 
 def write_table(path, rows):
@@ -111,17 +149,17 @@ def write_table(path, rows):
 
 
 class Plot:
-    """A plot of lines over rank counts on logarithmic axes, or of stacked shares."""
+    """A plot of lines over rank counts or sizes on logarithmic axes, or of stacked shares."""
 
     WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 360, 260, 64, 16, 30, 44
     COLOURS = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#17becf"]
 
-    def __init__(self, title, ranks):
-        self.title, self.ranks = title, ranks
+    def __init__(self, title, ranks, axis="ranks"):
+        self.title, self.ranks, self.axis = title, ranks, axis
         self.parts, self.legend = [], []
 
     def x(self, ranks):
-        first, last = self.ranks[0], max(self.ranks[-1], self.ranks[0] * 2)
+        first, last = min(self.ranks), max(max(self.ranks), min(self.ranks) * 2)
         share = _log(ranks / first) / _log(last / first)
         return self.LEFT + share * (self.WIDTH - self.LEFT - self.RIGHT)
 
@@ -159,7 +197,7 @@ class Plot:
             for k, name in enumerate(names):
                 share = row[name] / total
                 self.parts.append(
-                    f'<rect x="{self.x(row["ranks"]) - 8:.1f}" y="{self.y(below + share):.1f}" '
+                    f'<rect x="{self.x(row[self.axis]) - 8:.1f}" y="{self.y(below + share):.1f}" '
                     f'width="16" height="{self.y(below) - self.y(below + share):.1f}" '
                     f'fill="{self.COLOURS[k]}"/>')
                 below += share
@@ -178,9 +216,9 @@ class Plot:
         body += self.parts
         for ranks in self.ranks:
             body.append(f'<text x="{self.x(ranks):.1f}" y="{self.HEIGHT - self.BOTTOM + 16}" '
-                        f'text-anchor="middle">{ranks}</text>')
+                        f'text-anchor="middle">{ranks:.4g}</text>')
         body.append(f'<text x="{self.WIDTH / 2}" y="{self.HEIGHT - 12}" '
-                    f'text-anchor="middle">ranks</text>')
+                    f'text-anchor="middle">{self.axis}</text>')
         for k, (name, colour) in enumerate(self.legend):
             y = self.TOP + 10 + 13 * k
             body.append(f'<text x="{self.WIDTH - self.RIGHT - 4}" y="{y}" text-anchor="end" '
@@ -189,33 +227,41 @@ class Plot:
 
 
 def _log(value):
-    import math
     return math.log(value) if value > 0 else 0.0
 
 
 def write_plots(path, kind, rows):
-    ranks = [row["ranks"] for row in rows]
+    """Of the rows that did not fail; without Ghost only their iterations."""
+    bare = [row for row in rows if not row["ghost"] and "linear" in row]
+    rows = [row for row in rows if row["ghost"] and "linear" in row]
+    if not rows:
+        return
+    key = "points" if kind == "sizes" else "ranks"
+    places = [row[key] for row in rows]
     timed = [row for row in rows if "total" in row]
-    plot = lambda title: Plot(title, ranks)
-    per_rank = lambda key: [(row["ranks"], row[key]) for row in rows]
+    plot = lambda title: Plot(title, places, key)
+    over = lambda name, rows=rows: [(row[key], row[name]) for row in rows]
     plots = []
-    if timed:
+    if timed and kind != "sizes":
         first = timed[0]
-        speed = lambda row: first["total"] / row["total"] * (row["ranks"] / first["ranks"]
-                                                             if kind == "weak" else 1.0)
+        work = lambda row: row["points"] / first["points"]
         plots.append(plot("speed over the first row").lines({
-            "measured": [(row["ranks"], speed(row)) for row in timed],
-            "ideal": [(row["ranks"], row["ranks"] / first["ranks"]) for row in timed],
+            "measured": [(row[key], first["total"] / row["total"] * work(row)) for row in timed],
+            "ideal": [(row[key], row[key] / first[key]) for row in timed],
         }))
+    if timed:
         plots.append(plot("share of the phases").shares(timed, PHASES))
-    plots.append(plot("iterations per step").lines({
-        "newton": [(row["ranks"], row["newton"] / row["steps"]) for row in rows],
-        "linear": [(row["ranks"], row["linear"] / row["steps"]) for row in rows]}))
-    plots.append(plot("messages per rank and step").lines(
-        {"largest": per_rank("messages_max"), "mean": per_rank("messages_mean")}))
-    plots.append(plot("bytes per rank and step").lines(
-        {"largest": per_rank("bytes_max"), "mean": per_rank("bytes_mean")}))
-    plots.append(plot("memory of the largest rank, bytes").lines({"": per_rank("memory_max")}))
+    iterations = {"with Ghost": over("per_solve")}
+    if bare:
+        iterations["without"] = over("per_solve", bare)
+    plots.append(plot("linear iterations per solve").lines(iterations))
+    if kind != "sizes":
+        plots.append(plot("messages per rank and step").lines(
+            {"largest": over("messages_max"), "mean": over("messages_mean")}))
+        plots.append(plot("bytes per rank and step").lines(
+            {"largest": over("bytes_max"), "mean": over("bytes_mean")}))
+        plots.append(plot("reductions per step").lines({"": over("reductions")}))
+    plots.append(plot("memory of the largest rank, bytes").lines({"": over("memory_max")}))
     columns = 2
     height = Plot.HEIGHT * -(-len(plots) // columns) + 40
     with open(path, "w") as file:
@@ -223,35 +269,96 @@ def write_plots(path, kind, rows):
                    f'height="{height}" font-family="sans-serif" font-size="11">\n'
                    f'<rect width="100%" height="100%" fill="white"/>\n'
                    f'<text x="{Plot.WIDTH}" y="24" text-anchor="middle" font-size="14">'
-                   f'{kind} scaling of inputs/scaling.toml</text>\n')
+                   f'{kind}: inputs/scaling.toml</text>\n')
         for k, one in enumerate(plots):
             file.write(one.svg(Plot.WIDTH * (k % columns), 36 + Plot.HEIGHT * (k // columns)))
             file.write("\n")
         file.write("</svg>\n")
 
 
+def report(kind, rows):
+    """What the table says in a few lines."""
+    for ghost in (1, 0):
+        mine = [row for row in rows if row["ghost"] == ghost and "linear" in row]
+        failed = sum(row["ghost"] == ghost and "linear" not in row for row in rows)
+        if not mine and not failed:
+            continue
+        counts = [row["per_solve"] for row in mine]
+        spread = f"{min(counts):.1f} to {max(counts):.1f}" if counts else "none"
+        print(f"{kind}, {'with' if ghost else 'without'} Ghost: {spread} linear iterations per "
+              f"solve over {len(mine)} rows" + (f", {failed} failed" if failed else ""))
+        many = [row for row in mine if row["ranks"] >= 4]
+        if ghost and kind == "strong" and len(many) >= 3:
+            share = lambda name: exponent([(row["points"] / row["ranks"], row[name])
+                                           for row in many])
+            print(f"strong, 4 ranks and more: bytes of the busiest rank and step grow as "
+                  f"(points per rank)^{share('bytes_max'):.2f}, of the average rank "
+                  f"^{share('bytes_mean'):.2f}; the program's own ^{share('own_bytes_max'):.2f}; "
+                  f"a surface is ^0.5 in the plane")
+
+
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("kind", choices=["strong", "weak"])
-    words.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
-    words.add_argument("--h", default="0.125", help="cell size, m")
-    words.add_argument("--out", default=os.path.join(ROOT, "out/scaling"))
-    words.add_argument("--repeat", type=int, default=1)
+    words.add_argument("kind", choices=["strong", "weak", "sizes", "all"])
+    words.add_argument("--ranks", type=int, nargs="+")
+    words.add_argument("--h", type=float, default=0.03125,
+                       help="cell size, m: of strong; of weak on the largest rank count")
+    words.add_argument("--out", help="tables and plots; docs/figures for all")
+    words.add_argument("--work", default=os.path.join(ROOT, "out/scaling"))
+    words.add_argument("--repeat", type=int, default=3)
+    words.add_argument("--bare", type=int, nargs="*", default=None,
+                       help="rank counts that run without Ghost as well")
+    words.add_argument("--patience", type=int, default=0, help="s after which a run is given up")
+    words.add_argument("--resume", action="store_true")
     words.add_argument("--set", action="append", default=[], help="a key of the deck")
     words = words.parse_args()
-    os.makedirs(words.out, exist_ok=True)
+    everything = words.kind == "all"
+    out = words.out or (os.path.join(ROOT, "docs/figures") if everything else words.work)
+    os.makedirs(out, exist_ok=True)
+    os.makedirs(words.work, exist_ok=True)
     # On a cluster the batch system counts the cores.
-    limit = cores() if MACHINE == "local" else max(words.ranks)
-    rows = []
-    for ranks in sorted(words.ranks):
-        row = row_of(words.kind, ranks, words.h, words.out, words.repeat, words.set, limit)
-        rows.append(row)
-        time = f"{row['total']:9.3f} s" if "total" in row else "   (counts)"
-        print(f"{words.kind:6} {ranks:5} ranks {row['points']:9} points {time} "
-              f"{row['newton']:4} newton {row['linear']:5} linear "
-              f"{row['messages_max']:9.0f} messages {row['bytes_max']:11.3g} bytes", flush=True)
-        write_table(os.path.join(words.out, f"{words.kind}.csv"), rows)
-    write_plots(os.path.join(words.out, f"{words.kind}.svg"), words.kind, rows)
+    ranks = sorted(words.ranks or ([1, 2, 4, 8, 16, 32, 64] if everything else [1, 2]))
+    limit = cores() if MACHINE == "local" else max(ranks)
+    bare = words.bare if words.bare is not None else ([1, 2, 4, 16] if everything else [])
+
+    known, store = {}, os.path.join(words.work, "rows.json")
+    if words.resume and os.path.exists(store):
+        with open(store) as file:
+            known = json.load(file)
+
+    def measured(n, h, ghost):
+        key = f"{n} {h!r} {int(ghost)} {words.set}"
+        if key not in known:
+            known[key] = row_of(n, h, ghost, words.work, words.repeat, words.set, limit,
+                                words.patience)
+            with open(store, "w") as file:
+                json.dump(known, file, indent=1)
+        return known[key]
+
+    weak_h = {n: finer(words.h, n / ranks[-1]) for n in ranks}
+    # 10^4 to 10^6 points on as many ranks as there are cores.
+    sizes = [(min(limit, 2), WIDTH / cells) for cells in (80, 160, 320, 480, 800)]
+    plans = {"strong": [(n, words.h) for n in ranks], "weak": [(n, weak_h[n]) for n in ranks],
+             "sizes": sizes}
+    for kind, plan in plans.items():
+        if words.kind not in (kind, "all"):
+            continue
+        rows = []
+        for ghost in (True, False):
+            for n, h in plan:
+                if not ghost and not (n in bare or (kind == "sizes" and words.bare != [])):
+                    continue
+                row = measured(n, h, ghost)
+                rows.append(row)
+                if "linear" in row:
+                    time = f"{row['total']:9.3f} s" if "total" in row else "   (counts)"
+                    print(f"{kind:6} {'ghost' if ghost else 'bare ':5} {n:5} ranks "
+                          f"{row['points']:9} points {time} {row['newton']:4} newton "
+                          f"{row['linear']:5} linear {row['messages_max']:9.0f} messages "
+                          f"{row['bytes_max']:11.3g} bytes", flush=True)
+                write_table(os.path.join(out, f"scaling-{kind}.csv"), rows)
+        write_plots(os.path.join(out, f"scaling-{kind}.svg"), kind, rows)
+        report(kind, rows)
 
 
 if __name__ == "__main__":

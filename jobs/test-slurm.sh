@@ -12,13 +12,23 @@ fail() {
     exit 1
 }
 . "$(pwd)/jobs/common.sh"
-steps=${STEPS:-800}
-export LINKS=15 MACHINE=local
-# Slurm counts whole minutes and looks every half minute: the warning comes at 0 to 30 s.
+export LINKS=25 MACHINE=local
+settings=(--set grid.h=0.0625 --set analysis.tolerance=1e-9 --set "output.checkpoint={every=5}")
+# So many steps that the run takes 90 s here and now: longer than a job may last.
+sh jobs/mpirun.sh 2 "$PROGRAM" tests/decks/restart.toml --out "$folder/trial" "${settings[@]}" \
+    --set analysis.steps=1000 --set output.every=1000 >"$folder/trial.log" 2>&1 &
+trial=$!
+sleep 15
+kill -TERM $trial
+wait $trial
+done_in_trial=$(($(wc -l <"$folder/trial/history.csv") - 1))
+steps=${STEPS:-$((done_in_trial * 6 + 60))}
+# Slurm counts whole minutes and looks every half minute: the warning comes at 0 to 30 s. The
+# first link gets none that means anything, and is killed by its time limit.
 export CHAIN_OPTIONS="--time=1 --signal=B:USR1@30 --output=$folder/chain-%j.log"
-first=$(sbatch --parsable --ntasks=2 $CHAIN_OPTIONS jobs/chain.sbatch tests/decks/restart.toml \
-    "$folder/out" --set "analysis.steps=$steps" --set "output.every=$steps" \
-    --set grid.h=0.0625 --set analysis.tolerance=1e-9 --set "output.checkpoint={every=50}") || fail "sbatch refused the chain"
+first=$(sbatch --parsable --ntasks=2 --time=1 --signal=B:CONT@10 --output="$folder/chain-%j.log" \
+    jobs/chain.sbatch tests/decks/restart.toml "$folder/out" --set "analysis.steps=$steps" \
+    --set "output.every=$steps" "${settings[@]}") || fail "sbatch refused the chain"
 
 rows() { wc -l <"$folder/out/history.csv" 2>/dev/null || echo 0; }
 status() { sed -n 's/^  "status": "\(.*\)",$/\1/p' "$folder/out/summary.json" 2>/dev/null; }
@@ -31,9 +41,17 @@ wait_for() {
     done
     fail "$what"
 }
-# The first link: killed with all its processes, without warning, once it has left a checkpoint.
-wait_for "no checkpoint" sh -c "ls '$folder'/out/checkpoint-*.h5 >/dev/null 2>&1"
-scancel --signal=KILL --full "$first"
+wait_for "the first link is not killed by its time limit" \
+    grep -q "DUE TO TIME LIMIT" "$folder/chain-$first.log"
+limited=$(rows)
+# The second: killed with all its processes, without warning, once it has left a checkpoint.
+running() { squeue -h -t R -o %i | grep -v "^$first\$" | head -n 1; }
+newest() { ls "$folder/out" | sed -n 's/^checkpoint-0*\([0-9]*\)\.h5$/\1/p' | sort -n | tail -n 1; }
+reached=$(newest)
+[ -n "$reached" ] || fail "the first link left no checkpoint"
+further() { [ -n "$(running)" ] && [ "$(newest)" -gt "$reached" ]; }
+wait_for "no checkpoint of a second link" further
+scancel --signal=KILL --full "$(running)"
 before=$(rows)
 # The links after it go on, some stopped by their time limit, to the end.
 ended() { [ "$(status)" = completed ] || [ -z "$(squeue -h)" ]; }
@@ -41,14 +59,15 @@ wait_for "the chain does not end" ended
 [ "$(status)" = completed ] || fail "the chain ended early"
 [ "$before" -lt "$steps" ] || fail "the run was over before it was killed"
 [ "$(rows)" = $((steps + 1)) ] || fail "history.csv has $(rows) rows for $steps steps"
-echo "chain: killed at row $before, links: $(ls "$folder"/chain-*.log | wc -l)," \
-    "stopped by their limit: $(grep -l 'asked the run to stop' "$folder"/chain-*.log | wc -l)"
+echo "chain: killed at row $limited by its time limit, at row $before without warning, of" \
+    "$steps; links: $(ls "$folder"/chain-*.log | wc -l), stopped by the warning:" \
+    "$(grep -l 'asked the run to stop' "$folder"/chain-*.log | wc -l)"
 wait_for "a link is left" sh -c '[ -z "$(squeue -h)" ]'
 
 export OUT=$folder/scaling RANKS="1 2" H=0.5
 for kind in strong weak; do
     sbatch --wait --ntasks=2 --time=5 --output="$folder/$kind.log" jobs/$kind.sbatch >/dev/null ||
         fail "$kind.sbatch failed"
-    [ -s "$OUT/$kind.csv" ] && [ -s "$OUT/$kind.svg" ] || fail "$kind.sbatch left no table"
+    [ -s "$OUT/scaling-$kind.csv" ] && [ -s "$OUT/scaling-$kind.svg" ] || fail "$kind.sbatch left no table"
 done
 echo "scaling: tables written"

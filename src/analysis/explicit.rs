@@ -51,11 +51,12 @@ pub fn run<const D: usize>(
         ledger.save(&mut state);
         state
     };
+    let mut before = update::Snapshot::default();
     while let Some(span) = steps.next(limit) {
         let number = steps.number();
         let at = |why: &str| format!("step {number} (to t = {:.6e} s): {why}", span.time_end);
         // The points are as they were where a step fails.
-        let before = update::Snapshot::of(points);
+        before.record(points);
         let (mut solved, sums) = match advance(world, model, points, clock, span) {
             Ok(done) => done,
             Err(Error::Run(why)) => {

@@ -44,7 +44,7 @@ pub(super) fn advance<const D: usize>(
     let dt = span.time_end - span.time_start;
     let (mesh, conditions) = clock.time(Phase::Locate, || {
         let coupling = match deck.method.mass {
-            Mass::Consistent => Coupling::Matrix,
+            Mass::Consistent => Coupling::Mass,
             Mass::Lumped => Coupling::Diagonal,
         };
         let mesh = Discretisation::with_coupling(world, model, points, coupling)?;
@@ -77,12 +77,22 @@ pub(super) fn advance<const D: usize>(
         solving += begin.elapsed().as_secs_f64();
         outcome
     };
+    // Before the stress is updated last, one pass over the points gives both sums.
+    let mut force = None;
+    let sums = clock.time(Phase::Assemble, || {
+        let step = mesh.step_points(points, &model.materials);
+        if deck.method.stress_update == StressUpdate::Usf {
+            return Ok(mapping::momentum(step, &points.velocity, nodes));
+        }
+        let (momentum, sum) = mapping::momentum_and_force(step, &external, nodes);
+        force = Some(sum);
+        Ok(momentum)
+    })?;
     let mut inverse = None;
     let mut velocity = timed(&mut || {
         let inverse = inverse.insert(mass.inverse(world, grid, &mesh, &conditions.fixed)?);
         let step = mesh.step_points(points, &model.materials);
-        let sums = mapping::momentum(step, &points.velocity, nodes);
-        let velocity = inverse.solve(sums, &held_velocity)?;
+        let velocity = inverse.solve(sums.clone(), &held_velocity)?;
         match deck.method.xpic {
             Some(order) => sharpen(inverse, step, velocity, order, &at_rest, nodes),
             None => Ok(velocity),
@@ -121,7 +131,11 @@ pub(super) fn advance<const D: usize>(
     }
 
     let step = mesh.step_points(points, &model.materials);
-    let force = mapping::force(step, &external, &deformation, nodes);
+    let force = match force {
+        Some(force) => force,
+        None => clock
+            .time(Phase::Assemble, || Ok(mapping::force(step, &external, &deformation, nodes)))?,
+    };
     let mut pushed = force.clone();
     numbering.halo.reverse_add(world, pushed.as_flattened_mut(), D)?;
     require_mass(world, grid, &mesh, &mass, &conditions.fixed, &pushed)?;
@@ -130,50 +144,52 @@ pub(super) fn advance<const D: usize>(
         *v += dt * a;
     }
 
-    let rate = mapping::at_points(step, &acceleration);
-    let pushed_velocity: Vec<[f64; D]> = points
-        .velocity
-        .iter()
-        .zip(&rate)
-        .map(|(v, a)| std::array::from_fn(|i| v[i] + dt * a[i]))
-        .collect();
-    let new_velocity = match flip {
-        1.0 => pushed_velocity,
-        _ => blend(flip, &pushed_velocity, &mapping::at_points(step, &velocity)),
-    };
+    let (rate, new_velocity) = clock
+        .time(Phase::Update, || Ok(mapping::push(step, &acceleration, &velocity, flip, dt)))?;
 
     let musl = deck.method.stress_update == StressUpdate::Musl;
     let mut moving = velocity.clone();
+    let mut again = None;
     if carrier.needs_solve() || musl {
-        let again = timed(&mut || {
+        let solved = timed(&mut || {
             let sums = mapping::momentum(step, &new_velocity, nodes);
             inverse.solve_near(sums, &held_velocity, &velocity)
         })?;
-        if musl {
-            deforming = again.iter().map(|v| v * dt).collect();
-        }
         if carrier.needs_solve() {
-            moving = again;
+            moving.clone_from(&solved);
         }
+        again = Some(solved);
     }
     if matches!(carrier, Carrier::Start | Carrier::RemappedBack) {
         for (w, a) in moving.iter_mut().zip(&acceleration) {
             *w -= dt * a;
         }
     }
-    let carried = mapping::at_points(step, &moving);
+    let moved: Vec<f64> = moving.iter().map(|w| w * dt).collect();
     let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();
-    if deck.method.stress_update == StressUpdate::Usl {
-        deforming.clone_from(&displacement);
-    }
-    if deck.method.stress_update != StressUpdate::Usf {
-        deformation = mapping::deformation_increments(step, &deforming);
-    }
-    let made = Increments {
-        deformation,
-        displacement: carried.iter().map(|v| v.map(|v| v * dt)).collect(),
-    };
-    if let Some(why) = update::reason_to_refuse(world, grid, points, &made) {
+    let made = clock.time(Phase::Update, || {
+        let deforming = match (deck.method.stress_update, &again) {
+            (StressUpdate::Usf, _) => {
+                let mut displacement = mapping::at_points(step, &moved);
+                return Ok(Increments {
+                    deformation: std::mem::take(&mut deformation),
+                    displacement: std::mem::take(&mut displacement),
+                });
+            }
+            (StressUpdate::Musl, Some(again)) => again.iter().map(|v| v * dt).collect(),
+            _ => displacement.clone(),
+        };
+        if deforming == moved {
+            return Ok(update::increments(step, &moved));
+        }
+        Ok(Increments {
+            deformation: mapping::deformation_increments(step, &deforming),
+            displacement: mapping::at_points(step, &moved),
+        })
+    })?;
+    let why =
+        clock.time(Phase::Update, || Ok(update::reason_to_refuse(world, grid, points, &made)))?;
+    if let Some(why) = why {
         return Err(Error::Run(why));
     }
 
@@ -183,10 +199,10 @@ pub(super) fn advance<const D: usize>(
     let ghost = mass.ghost_energy(&mesh, &velocity);
     let linear_iterations = inverse.iterations();
     clock.add(Phase::Solve, solving);
-    let moved: Vec<f64> = moving.iter().map(|w| w * dt).collect();
     clock.time(Phase::Update, || {
-        if deck.method.stress_update != StressUpdate::Usf {
-            energies = update::deform(&model.materials, &made.deformation, points);
+        let usf = deck.method.stress_update == StressUpdate::Usf;
+        if !usf {
+            update::stretch(&made.deformation, points);
         }
         let method = &deck.method;
         let followed = update::follow(
@@ -199,6 +215,9 @@ pub(super) fn advance<const D: usize>(
             points,
         );
         world.fail_together(followed)?;
+        if !usf {
+            energies = update::respond(&model.materials, &made.deformation, points);
+        }
         update::move_points(&made.displacement, points);
         points.velocity = new_velocity;
         points.acceleration = rate;

@@ -69,10 +69,11 @@ pub fn run<const D: usize>(
         state.set("ghost_energy", ghost_energy);
         state
     };
+    let mut before = update::Snapshot::default();
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
         // The points are as they were where a step fails.
-        let before = update::Snapshot::of(points);
+        before.record(points);
         let outcome = match solve_step(world, model, points, recorder, clock, span, number) {
             Ok(Ok(solved)) => {
                 let mut row = solved.row.clone();

@@ -134,6 +134,9 @@ fn share_border_cells<const D: usize>(
     cells: &mut FxHashMap<usize, Cell>,
 ) -> Result<()> {
     let here = world.rank();
+    if world.size() == 1 {
+        return Ok(());
+    }
     let mut outgoing: FxHashMap<usize, Vec<u64>> = FxHashMap::default();
     let mut neighbours = Vec::new();
     let mut ranks = Vec::new();
@@ -142,6 +145,9 @@ fn share_border_cells<const D: usize>(
         grid.face_neighbours(cell, &mut neighbours);
         ranks.clear();
         ranks.extend(neighbours.iter().map(|&n| partition.owner_of_cell(grid, n)));
+        if ranks.iter().all(|&rank| rank == here) {
+            continue;
+        }
         ranks.sort_unstable();
         ranks.dedup();
         let state = cells[&cell];

@@ -16,5 +16,6 @@ mod implicit;
 mod ranks;
 mod report;
 mod restart;
+mod space;
 mod stretch;
 mod table_3;
