@@ -33,6 +33,8 @@ test: setup
 
 bench: setup
 	cargo bench --bench kernels
+	cargo bench --bench runs
+	cargo bench --bench explicit
 
 # Writes docs/figures/iterations.csv and .svg.
 iterations: setup
@@ -46,10 +48,9 @@ scaling: build
 compare: build
 	python3 jobs/compare.py
 
-# Every deck with a published number, the long ones too; rewrites the tables of docs/validation.md.
+# Every deck with a published number, the long ones too; rewrites the tables of docs/validation*.md.
 validate: setup
-	MPM_PAR_VALIDATION=1 cargo test --release --test quasi_static -- --include-ignored
-	cargo test --release -- --ignored
+	MPM_PAR_VALIDATION=1 cargo test --release --no-fail-fast -- --include-ignored
 
 docs: setup
 	cargo doc --no-deps

@@ -1,5 +1,6 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
+use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::internal::StepPoints;
 use crate::assembly::manufactured::Manufactured;
 use crate::assembly::numbering::Touched;
@@ -58,6 +59,8 @@ pub struct Discretisation<const D: usize> {
 pub enum Coupling {
     /// Faces and sparsity are found.
     Matrix,
+    /// The same for a mass: what [`Discretisation::nodes_left_out`] reads is not.
+    Mass,
     /// A diagonal system: neither faces nor sparsity (both stay empty).
     Diagonal,
 }
@@ -66,6 +69,27 @@ impl<const D: usize> Discretisation<D> {
     /// Maps the points onto the grid and numbers the equations. Collective.
     pub fn new(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Self> {
         Self::with_coupling(world, model, points, Coupling::Matrix)
+    }
+
+    /// The grid side of a step together with what the boundaries prescribe in it. Collective.
+    pub fn with_conditions(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        coupling: Coupling,
+        span: StepSpan,
+    ) -> Result<(Self, Conditions)> {
+        let mesh = Self::with_coupling(world, model, points, coupling)?;
+        let conditions = Conditions::evaluate(
+            world,
+            &model.grid,
+            model.deck.method.basis,
+            &mesh.numbering,
+            points,
+            &model.deck.boundaries,
+            span,
+        )?;
+        Ok((mesh, conditions))
     }
 
     /// As [`Self::new`]. Collective.
@@ -81,7 +105,7 @@ impl<const D: usize> Discretisation<D> {
         let groups = Groups::new(&influences);
         let populated = Populated::find(world, grid, partition, basis, points)?;
         let (faces, ghost_cells) = match coupling {
-            Coupling::Matrix => find_faces(world, model, &populated)?,
+            Coupling::Matrix | Coupling::Mass => find_faces(world, model, &populated)?,
             Coupling::Diagonal => Default::default(),
         };
 
@@ -97,7 +121,9 @@ impl<const D: usize> Discretisation<D> {
             .chain(faces.iter().map(|face| face.nodes.as_slice()));
         let owner_of = |node| partition.owner_of_node(grid, node);
         let (numbering, pattern) = match coupling {
-            Coupling::Matrix => pattern::build(world, touched, owner_of, supports)?,
+            Coupling::Matrix | Coupling::Mass => {
+                pattern::build(world, touched, owner_of, supports)?
+            }
             Coupling::Diagonal => {
                 (Numbering::build(world, touched.owned, &touched.foreign)?, Pattern::default())
             }
@@ -114,20 +140,27 @@ impl<const D: usize> Discretisation<D> {
             let nodes = &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
             for (&node, entry) in nodes.iter().zip(influences.row(p)) {
                 let weight = influences.weights[entry];
-                let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
                 node_weight[node as usize] += weight;
+                if coupling != Coupling::Matrix {
+                    continue;
+                }
+                let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
                 node_grip[node as usize] += weight.abs() + reach * slope;
             }
         }
+        numbering.halo.reverse_add(world, &mut node_weight, 1)?;
+        numbering.halo.forward(world, &mut node_weight, 1)?;
         let mut on_face = vec![0.0; numbering.len()];
-        for face in &faces {
-            for node in locals(&face.nodes) {
-                on_face[node as usize] = 1.0;
+        if coupling == Coupling::Matrix {
+            for face in &faces {
+                for node in locals(&face.nodes) {
+                    on_face[node as usize] = 1.0;
+                }
             }
-        }
-        for field in [&mut node_weight, &mut node_grip, &mut on_face] {
-            numbering.halo.reverse_add(world, field, 1)?;
-            numbering.halo.forward(world, field, 1)?;
+            for field in [&mut node_grip, &mut on_face] {
+                numbering.halo.reverse_add(world, field, 1)?;
+                numbering.halo.forward(world, field, 1)?;
+            }
         }
         Ok(Discretisation {
             influences,

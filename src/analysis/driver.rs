@@ -23,7 +23,7 @@ use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
 use super::{balance, conditioning, explicit, implicit_dynamic, quasi_static};
-use super::{plan, setup};
+use super::{plan, setup, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
@@ -47,7 +47,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
         Ok(()) => 0,
         Err(error) => {
             if world.is_root() {
-                eprintln!("{}", error.to_string().trim_end());
+                eprintln!("error: {}", error.to_string().trim_end());
             }
             error.exit_code()
         }
@@ -79,7 +79,7 @@ fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
     let path = &arguments.input;
     let read = if world.is_root() {
         std::fs::read(path).map_err(|reason| {
-            Error::Input(format!("error: cannot read the deck {}: {reason}", path.display()))
+            Error::Input(format!("cannot read the deck {}: {reason}", path.display()))
         })
     } else {
         Ok(Vec::new())
@@ -87,7 +87,7 @@ fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
     let mut bytes = world.fail_together(read)?;
     world.broadcast_bytes(0, &mut bytes);
     String::from_utf8(bytes)
-        .map_err(|_| Error::Input(format!("error: {} is not UTF-8 text", path.display())))
+        .map_err(|_| Error::Input(format!("{} is not UTF-8 text", path.display())))
 }
 
 fn versions() -> BTreeMap<String, String> {
@@ -139,6 +139,9 @@ impl Run<'_> {
                 (model, points, Some((resume, used, step)))
             }
         };
+        if resume.is_none() && model.deck.analysis.kind == AnalysisType::QuasiStatic {
+            support::require(world, &model, &points, quasi_static::first_span(&model.deck))?;
+        }
         self.log.say(&report::plan(&plan::of(world, &model, &points)?));
         if self.arguments.check {
             self.log.say("The deck is good; nothing was run (--check).");
@@ -182,7 +185,10 @@ impl Run<'_> {
             Ok(ending) => (ending, Error::Run),
             Err(error) => {
                 let kind = if error.exit_code() == 3 { Error::File } else { Error::Run };
-                (Ending::failed(error.to_string()), kind)
+                let (text, step) = (error.to_string(), recorder.steps_completed + 1);
+                let named = text.starts_with("step ");
+                let text = if named { text } else { format!("step {step}: {text}") };
+                (Ending::failed(text), kind)
             }
         };
         let figures = quasi_static::figures(world, &model, &points, &recorder)?;

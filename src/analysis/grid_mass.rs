@@ -135,12 +135,31 @@ enum How<'a, const D: usize> {
 impl<const D: usize> Inverse<'_, D> {
     /// M x = `sums`, where held x = `prescribed` (local). `sums` are nodal sums of this rank's
     /// points, sent to their owners here. Returns local values. Collective.
-    pub fn solve(&mut self, mut sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
+    pub fn solve(&mut self, sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
+        self.solve_from(sums, prescribed, None)
+    }
+
+    /// [`Self::solve`] where x is near `guess` (local): iterations start there. Collective.
+    pub fn solve_near(
+        &mut self,
+        sums: Vec<[f64; D]>,
+        prescribed: &[f64],
+        guess: &[f64],
+    ) -> Result<Vec<f64>> {
+        self.solve_from(sums, prescribed, Some(guess))
+    }
+
+    fn solve_from(
+        &mut self,
+        mut sums: Vec<[f64; D]>,
+        prescribed: &[f64],
+        guess: Option<&[f64]>,
+    ) -> Result<Vec<f64>> {
         let numbering = &self.mesh.numbering;
         numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
         let rhs = &sums.as_flattened()[..numbering.owned * D];
         match &mut self.how {
-            How::Consistent(inverse) => inverse.solve(rhs, prescribed),
+            How::Consistent(inverse) => inverse.solve_from(rhs, prescribed, guess),
             How::Lumped(mass) => {
                 let mut x = vec![0.0; numbering.len() * D];
                 for (dof, value) in rhs.iter().enumerate() {

@@ -9,7 +9,7 @@
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::point_forces;
 use crate::deck::model::AnalysisType;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::RunState;
 use crate::output::history::HistoryRow;
@@ -50,14 +50,18 @@ pub fn run<const D: usize>(
         StepSums { energies: update::energies(points, &model.materials), ..StepSums::default() };
     let mut ledger = Ledger::new(&Entry::unite(world, points, start), wave_energy);
     let mut ghost_energy = 0.0;
-    match recorder.resumed() {
+    let mut framed = match recorder.resumed() {
         Some(state) => {
             stepping.restore(state)?;
             ledger.restore(state)?;
             ghost_energy = state.number("ghost_energy")?;
+            None
         }
-        None => recorder.frame(world, 0, 0.0, points)?,
-    }
+        None => {
+            recorder.frame(world, 0, 0.0, points)?;
+            Some(0)
+        }
+    };
     let state_of = |stepping: &Stepping, ledger: &Ledger, ghost_energy: f64| {
         let mut state = RunState::new();
         stepping.save(&mut state);
@@ -65,33 +69,62 @@ pub fn run<const D: usize>(
         state.set("ghost_energy", ghost_energy);
         state
     };
+    let mut before = update::Snapshot::default();
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
-        let stopped = |why: String, completed: usize| {
-            Ending::stopped(format!(
-                "step {number} of {steps} (t = {:.6e} s) could not be solved: {why}; the last \
-                 finished step is {completed}",
-                span.time_end
-            ))
+        // The points are as they were where a step fails.
+        before.record(points);
+        let outcome = match solve_step(world, model, points, recorder, clock, span, number) {
+            Ok(Ok(solved)) => {
+                let mut row = solved.row.clone();
+                let entry = Entry::unite(world, points, solved.sums);
+                match ledger.book(&entry, &mut row) {
+                    Ok(()) => Ok((solved, row)),
+                    Err(why) => {
+                        // The row shows what happened.
+                        recorder.step(world, &row, true)?;
+                        Err(Fault::Final(format!(
+                            "{why}; smaller steps, or analysis.hht_alpha = -0.1, damp what they \
+                             excite"
+                        )))
+                    }
+                }
+            }
+            Ok(Err(why)) => Err(Fault::Step(why)),
+            Err(Error::Run(why)) => Err(Fault::Final(why)),
+            Err(other) => return Err(other),
         };
-        let solved = match solve_step(world, model, points, recorder, clock, span, number)? {
-            Ok(solved) => solved,
-            Err(why) => {
-                recorder.log.say(&format!("step {number} refused: {why}"));
-                if stepping.refuse() {
-                    continue;
+        let (solved, mut row) = match outcome {
+            Ok(done) => done,
+            Err(fault) => {
+                before.restore(points);
+                if let Fault::Step(why) = &fault {
+                    recorder.log.say(&format!("step {number} refused: {why}"));
+                    if stepping.refuse() {
+                        continue;
+                    }
+                }
+                let completed = stepping.completed();
+                if framed != Some(completed) {
+                    recorder.frame(world, completed, span.time_start, points)?;
                 }
                 let state = state_of(&stepping, &ledger, ghost_energy);
                 recorder.keep_last_state(world, model, points, state)?;
-                return Ok(stopped(why, stepping.completed()));
+                let culprit = world.first_message(update::not_finite(points));
+                let culprit = culprit.map_or(String::new(), |text| format!(": {text}"));
+                let end = format!("t = {:.6e} s", span.time_end);
+                return Ok(match fault {
+                    Fault::Step(why) => Ending::stopped(format!(
+                        "step {number} of {steps} ({end}) could not be solved: {why}{culprit}; the \
+                         last finished step is {completed}"
+                    )),
+                    Fault::Final(why) => Ending::failed(format!(
+                        "step {number} of {steps} ({end}): {why}{culprit}; the last finished step \
+                         is {completed}"
+                    )),
+                });
             }
         };
-        let mut row = solved.row;
-        let entry = Entry::unite(world, points, solved.sums);
-        if let Err(why) = ledger.book(&entry, &mut row) {
-            let advice = "smaller steps, or analysis.hht_alpha = -0.1, damp what they excite";
-            return Ok(stopped(format!("{why}; {advice}"), stepping.completed()));
-        }
         let ended = stepping.accept();
         recorder.steps_completed = stepping.completed();
         ghost_energy += solved.ghost_work;
@@ -102,6 +135,7 @@ pub fn run<const D: usize>(
             if ended && recorder.wants_frame(number, span.time_end, last) {
                 let time = span.time_end;
                 recorder.frame(world, number, time, points)?;
+                framed = Some(number);
                 let (displacement, reaction) = (&solved.displacement, &solved.reaction);
                 recorder.grid_frame(
                     world,
@@ -136,6 +170,13 @@ pub fn run<const D: usize>(
         }
     }
     Ok(Ending::completed())
+}
+
+/// Why a step is not accepted.
+enum Fault {
+    /// A smaller one may be.
+    Step(String),
+    Final(String),
 }
 
 /// A finished step: its row but for the ledger, and the grid as it was solved.

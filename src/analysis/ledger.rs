@@ -133,21 +133,22 @@ impl Ledger {
         ]
     }
 
-    /// Books a step into its row. The answer names energy that came from nowhere.
+    /// Books a step into its row. The answer names energy that came from nowhere; such a step is
+    /// in the row only.
     pub fn book(&mut self, entry: &Entry, row: &mut HistoryRow) -> std::result::Result<(), String> {
-        self.work += entry.work;
-        self.gross_work += entry.work.abs();
+        let (work, gross_work) = (self.work + entry.work, self.gross_work + entry.work.abs());
         row.energy_kinetic = entry.kinetic;
         row.energy_strain = entry.strain;
         row.energy_plastic = entry.plastic;
         row.energy_ghost = entry.ghost;
-        row.work_external = self.work;
+        row.work_external = work;
         row.momentum = entry.momentum;
         row.angular_momentum = entry.angular_momentum;
 
-        let gained = entry.total() - self.start - self.work;
-        let brought = self.start + self.gross_work;
+        let gained = entry.total() - self.start - work;
+        let brought = self.start + gross_work;
         if gained.is_finite() && gained <= GROWTH * brought + self.noise {
+            (self.work, self.gross_work) = (work, gross_work);
             return Ok(());
         }
         Err(format!(

@@ -3,13 +3,15 @@
 //! | deck value or step | file | source |
 //! |---|---|---|
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
-//! | `explicit` | `explicit.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
+//! | `explicit` | `explicit.rs`, `explicit_step.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
+//! | what carries the points | `transport.rs` | Ghost eq. 9 |
 //! | `implicit-dynamic` | `implicit_dynamic.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
 //! | points to nodes and back | `mapping.rs` | Ghost eq. 6, 8-10 |
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
+//! | rigid motions held? | `support.rs` | |
 //! | map and number: the grid side of a step | `discretise.rs` | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
 //! | Newton's method for a step | `newton.rs` | |
@@ -32,6 +34,7 @@ pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
 pub mod explicit;
+mod explicit_step;
 pub mod extremes;
 pub mod grid_mass;
 pub mod implicit_dynamic;
@@ -46,6 +49,8 @@ pub mod recorder;
 pub mod setup;
 pub mod solver;
 pub mod stepping;
+pub mod support;
 pub mod time_step;
+pub mod transport;
 pub mod update;
 pub mod verify;

@@ -4,6 +4,7 @@
 use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::{map_forces, point_forces};
+use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -17,7 +18,7 @@ use crate::points::Points;
 use super::balance::{self, imbalance};
 use super::checkpointing::Moment;
 use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
+use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
@@ -120,6 +121,12 @@ pub fn run<const D: usize>(
     Ok(Ending::completed())
 }
 
+/// The first load step of the deck.
+pub fn first_span(deck: &Deck) -> StepSpan {
+    let factor_end = 1.0 / deck.analysis.steps.unwrap_or(1) as f64;
+    StepSpan { factor_start: 0.0, factor_end, time_start: 0.0, time_end: 0.0 }
+}
+
 /// Sums over the run so far.
 #[derive(Default)]
 struct Totals {
@@ -163,17 +170,7 @@ fn solve_step<const D: usize>(
 ) -> Result<std::result::Result<Solved<D>, String>> {
     let deck = &model.deck;
     let (mesh, conditions) = clock.time(Phase::Locate, || {
-        let mesh = Discretisation::new(world, model, points)?;
-        let conditions = Conditions::evaluate(
-            world,
-            &model.grid,
-            deck.method.basis,
-            &mesh.numbering,
-            points,
-            &deck.boundaries,
-            span,
-        )?;
-        Ok((mesh, conditions))
+        Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
     })?;
     let numbering = &mesh.numbering;
     let external = |factor: f64, time: f64| -> Result<Vec<f64>> {

@@ -88,6 +88,18 @@ pub fn reason_to_refuse<const D: usize>(
     world.first_message(reason)
 }
 
+/// The first point of this rank whose state is not a number, if any.
+pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
+    let p = (0..points.len()).find(|&p| {
+        let sound = points.velocity[p].iter().chain(&points.kirchhoff_stress[p]);
+        !sound.chain(&points.position[p]).all(|value| value.is_finite())
+    })?;
+    Some(format!(
+        "point {} at {:?} m has velocity {:?} m/s, which with its stress is not finite",
+        points.id[p], points.position[p], points.velocity[p]
+    ))
+}
+
 /// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
 /// step, if any. Collective.
 #[allow(clippy::too_many_arguments)]
@@ -153,6 +165,29 @@ pub fn deform<const D: usize>(
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
 ) -> PointEnergies {
+    stretch(increments, points);
+    respond(materials, increments, points)
+}
+
+/// F of the increments dF alone: what [`follow`] reads.
+pub fn stretch<const D: usize>(increments: &[[[f64; D]; D]], points: &mut Points<D>) {
+    for (gradient, increment) in points.deformation_gradient.iter_mut().zip(increments) {
+        // The rows and columns beyond D are those of the identity.
+        let before = *gradient;
+        for j in 0..3 {
+            for i in 0..D {
+                gradient[(i, j)] = (0..D).map(|k| increment[i][k] * before[(k, j)]).sum();
+            }
+        }
+    }
+}
+
+/// b_e, stress and history of the increments dF; energies as [`deform`] returns them.
+pub fn respond<const D: usize>(
+    materials: &[Material],
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+) -> PointEnergies {
     let mut sum = PointEnergies::default();
     for (p, increment) in increments.iter().enumerate() {
         let start = StepStart {
@@ -162,7 +197,6 @@ pub fn deform<const D: usize>(
             volume_initial: points.volume_initial[p],
         };
         let state = mechanics::stress(&start, increment);
-        points.deformation_gradient[p] = embed(increment) * points.deformation_gradient[p];
         points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
         points.kirchhoff_stress[p] = state.kirchhoff_stress;
         points.plastic_strain[p] += state.plastic_increment;
@@ -173,35 +207,48 @@ pub fn deform<const D: usize>(
     sum
 }
 
-/// The state that [`deform`] and [`follow`] overwrite, to go back to where a step fails.
+/// The state that a step overwrites, to go back to where it fails. Kept from step to step, so
+/// that recording allocates only where points have come.
+#[derive(Default)]
 pub struct Snapshot<const D: usize> {
+    position: Vec<[f64; D]>,
+    velocity: Vec<[f64; D]>,
+    acceleration: Vec<[f64; D]>,
     deformation_gradient: Vec<Matrix3<f64>>,
     elastic_left_cauchy_green: Vec<Matrix3<f64>>,
     kirchhoff_stress: Vec<Matrix3<f64>>,
     plastic_strain: Vec<f64>,
     dissipation: Vec<f64>,
     half_length: Vec<[f64; D]>,
+    corners: Vec<[[f64; D]; 8]>,
 }
 
 impl<const D: usize> Snapshot<D> {
-    pub fn of(points: &Points<D>) -> Self {
-        Snapshot {
-            deformation_gradient: points.deformation_gradient.clone(),
-            elastic_left_cauchy_green: points.elastic_left_cauchy_green.clone(),
-            kirchhoff_stress: points.kirchhoff_stress.clone(),
-            plastic_strain: points.plastic_strain.clone(),
-            dissipation: points.dissipation.clone(),
-            half_length: points.half_length.clone(),
-        }
+    pub fn record(&mut self, points: &Points<D>) {
+        self.position.clone_from(&points.position);
+        self.velocity.clone_from(&points.velocity);
+        self.acceleration.clone_from(&points.acceleration);
+        self.deformation_gradient.clone_from(&points.deformation_gradient);
+        self.elastic_left_cauchy_green.clone_from(&points.elastic_left_cauchy_green);
+        self.kirchhoff_stress.clone_from(&points.kirchhoff_stress);
+        self.plastic_strain.clone_from(&points.plastic_strain);
+        self.dissipation.clone_from(&points.dissipation);
+        self.half_length.clone_from(&points.half_length);
+        self.corners.clone_from(&points.corners);
     }
 
-    pub fn restore(self, points: &mut Points<D>) {
-        points.deformation_gradient = self.deformation_gradient;
-        points.elastic_left_cauchy_green = self.elastic_left_cauchy_green;
-        points.kirchhoff_stress = self.kirchhoff_stress;
-        points.plastic_strain = self.plastic_strain;
-        points.dissipation = self.dissipation;
-        points.half_length = self.half_length;
+    /// The points as they were recorded.
+    pub fn restore(&self, points: &mut Points<D>) {
+        points.position.clone_from(&self.position);
+        points.velocity.clone_from(&self.velocity);
+        points.acceleration.clone_from(&self.acceleration);
+        points.deformation_gradient.clone_from(&self.deformation_gradient);
+        points.elastic_left_cauchy_green.clone_from(&self.elastic_left_cauchy_green);
+        points.kirchhoff_stress.clone_from(&self.kirchhoff_stress);
+        points.plastic_strain.clone_from(&self.plastic_strain);
+        points.dissipation.clone_from(&self.dissipation);
+        points.half_length.clone_from(&self.half_length);
+        points.corners.clone_from(&self.corners);
     }
 }
 
@@ -216,7 +263,10 @@ pub fn follow<const D: usize>(
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
 ) -> Result<()> {
-    let whole: Vec<Matrix3<f64>> = increments.iter().map(embed).collect();
+    let whole: Vec<Matrix3<f64>> = match rule {
+        DomainUpdate::NormalIncremental => increments.iter().map(embed).collect(),
+        _ => Vec::new(),
+    };
     update_domains(grid, basis, rule, points, &whole, &|node| match numbering.local(node) {
         Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
         None => [0.0; D],

@@ -48,6 +48,7 @@ impl Conditions {
             increment: vec![0.0; numbering.len() * D],
             members: vec![Vec::new(); boundaries.len()],
         };
+        let mut problem = None;
         for (b, boundary) in boundaries.iter().enumerate() {
             let inside = members(world, grid, basis, numbering, points, &boundary.place)?;
             for local in (0..numbering.len()).filter(|&local| inside[local]) {
@@ -69,9 +70,17 @@ impl Conditions {
                 for (component, value) in held.iter().enumerate() {
                     let Some(value) = *value else { continue };
                     let dof = local * D + component;
+                    if !value.is_finite() {
+                        problem = problem.or(Some(format!(
+                            "boundary \"{}\" moves component {component} of the node at {:?} by \
+                             {value}: its expression is not finite there",
+                            boundary.name,
+                            grid.node_position(node),
+                        )));
+                    }
                     let clash = conditions.fixed[dof] && conditions.increment[dof] != value;
                     if clash && conditions.increment[dof] != 0.0 && value != 0.0 {
-                        return Err(Error::Input(format!(
+                        problem = problem.or(Some(format!(
                             "boundary \"{}\" moves component {component} of the node at {:?} by \
                              {value} in this step, but an earlier boundary moves it by {}; let \
                              one of them leave the node out",
@@ -90,7 +99,10 @@ impl Conditions {
                 }
             }
         }
-        Ok(conditions)
+        match world.first_message(problem) {
+            Some(problem) => Err(Error::Input(problem)),
+            None => Ok(conditions),
+        }
     }
 }
 

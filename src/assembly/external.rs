@@ -4,7 +4,7 @@
 use crate::basis::Influences;
 use crate::deck::Scope;
 use crate::deck::model::{AnalysisType, Load};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::points::Points;
 
@@ -57,7 +57,14 @@ pub fn point_forces<const D: usize>(
             }
         }
     }
-    Ok(forces)
+    match forces.iter().position(|force| force.iter().any(|f| !f.is_finite())) {
+        None => Ok(forces),
+        Some(p) => Err(Error::Run(format!(
+            "the load on point {} at {:?} is not finite ({:?} N at s = {load_factor}): check the \
+             expressions of [[load]]",
+            points.id[p], points.position[p], forces[p]
+        ))),
+    }
 }
 
 /// Variables of an expression at a point.

@@ -1,7 +1,7 @@
 //! M x = b (Ghost eq. 6, 10) for all components at once, with values prescribed at some nodes.
 //!
-//! Small systems of one rank are factored; larger ones are solved by conjugate gradients with
-//! Jacobi preconditioning, all components in lockstep over one sweep of the scalar matrix and
+//! Small systems of one rank are factored; larger ones are solved by conjugate gradients
+//! preconditioned along grid lines ([`super::lines`]), all components in lockstep over one sweep of the scalar matrix and
 //! one reduction. With any PETSc option `-mass_...` the system goes to PETSc instead (default
 //! there: `cg`, `jacobi`, relative tolerance 1e-14), component by component.
 
@@ -11,6 +11,7 @@ use crate::parallel::World;
 use crate::petsc::{Ksp, Matrix, options};
 
 use super::envelope::{self, Envelope};
+use super::lines::Lines;
 use super::{BlockMatrix, Numbering, Pattern, mass};
 
 /// Relative residual of the iteration, in the norm of the preconditioner.
@@ -38,14 +39,14 @@ pub struct MassInverse<'a, const D: usize> {
 enum Method<const D: usize> {
     /// A factor, and which one serves each component.
     Direct(Vec<Envelope>, [usize; D]),
-    Iterative(Jacobi),
+    Iterative(Box<Start>),
     Petsc(Box<Ksp>),
 }
 
-/// Per owned node; zero where there is no mass.
-struct Jacobi {
-    inverse_diagonal: Vec<f64>,
-    /// The lumped mass: where the iteration starts. For a constant field that is the solution.
+struct Start {
+    lines: Lines,
+    /// The lumped mass, per owned node: where the iteration starts. For a constant field that is
+    /// the solution. Zero where there is no mass.
     inverse_row_sum: Vec<f64>,
 }
 
@@ -82,13 +83,13 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             Method::Direct(factors, which)
         } else {
             let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
-            Method::Iterative(Jacobi {
-                inverse_diagonal: diagonal.iter().map(one_over).collect(),
+            Method::Iterative(Box::new(Start {
+                lines: Lines::factor(grid, numbering, pattern, matrix, &diagonal),
                 inverse_row_sum: mass::row_sums(matrix, pattern, rows)
                     .iter()
                     .map(one_over)
                     .collect(),
-            })
+            }))
         };
         Ok(MassInverse { world, numbering, pattern, matrix, free, method, iterations: 0 })
     }
@@ -97,6 +98,16 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     /// read where held. Returns local values, ghosts included. Collective. Error: a right-hand
     /// side that is not finite, or no convergence.
     pub fn solve(&mut self, rhs: &[f64], prescribed: &[f64]) -> Result<Vec<f64>> {
+        self.solve_from(rhs, prescribed, None)
+    }
+
+    /// [`Self::solve`] with local values `guess` near the solution, where an iteration may start.
+    pub fn solve_from(
+        &mut self,
+        rhs: &[f64],
+        prescribed: &[f64],
+        guess: Option<&[f64]>,
+    ) -> Result<Vec<f64>> {
         let owned = self.numbering.owned * D;
         let mut x = vec![0.0; self.numbering.len() * D];
         let mut moved = false;
@@ -133,7 +144,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                 }
                 b
             }
-            Method::Iterative(_) => self.conjugate_gradients(&b)?,
+            Method::Iterative(_) => self.conjugate_gradients(&b, guess)?,
             Method::Petsc(_) => self.by_petsc(&b)?,
         };
         for (dof, value) in solution.into_iter().enumerate() {
@@ -145,53 +156,58 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         Ok(x)
     }
 
-    fn conjugate_gradients(&mut self, b: &[f64]) -> Result<Vec<f64>> {
-        let Method::Iterative(jacobi) = &self.method else { return Ok(b.to_vec()) };
-        let inverse = &jacobi.inverse_diagonal;
+    fn conjugate_gradients(&mut self, b: &[f64], guess: Option<&[f64]>) -> Result<Vec<f64>> {
+        let Method::Iterative(start) = &self.method else { return Ok(b.to_vec()) };
         let (world, owned) = (self.world, b.len());
+        let precondition = |r: &[f64], z: &mut [f64]| start.lines.apply::<D>(r, &self.free, z);
         // Local: the product reads ghosts.
         let mut p = vec![0.0; self.numbering.len() * D];
         let mut product = vec![0.0; owned];
         for (dof, b) in b.iter().enumerate() {
-            p[dof] = b * jacobi.inverse_row_sum[dof / D];
+            p[dof] = match guess {
+                Some(guess) if self.free[dof] => guess[dof],
+                Some(_) => 0.0,
+                None => b * start.inverse_row_sum[dof / D],
+            };
         }
         let mut x = p[..owned].to_vec();
         self.numbering.halo.forward(world, &mut p, D)?;
         self.multiply_free(&p, &mut product);
         let mut r: Vec<f64> = b.iter().zip(&product).map(|(b, p)| b - p).collect();
         p.fill(0.0);
-        let dot = |a: &[f64], b: &[f64], scaled: bool| -> Vec<f64> {
-            let mut sums = vec![0.0; D];
-            for (node, (a, b)) in a.chunks_exact(D).zip(b.chunks_exact(D)).enumerate() {
-                let scale = if scaled { inverse[node] } else { 1.0 };
+        let mut z = vec![0.0; owned];
+        let dot = |a: &[f64], b: &[f64]| -> Vec<f64> {
+            let mut sums = [0.0; D];
+            for (a, b) in a.chunks_exact(D).zip(b.chunks_exact(D)) {
                 for k in 0..D {
-                    sums[k] += a[k] * b[k] * scale;
+                    sums[k] += a[k] * b[k];
                 }
             }
             world.sum_slice(&sums)
         };
-        let start = dot(b, b, true);
-        let mut size = dot(&r, &r, true);
+        precondition(b, &mut z);
+        let whole = dot(b, &z);
+        precondition(&r, &mut z);
+        let mut size = dot(&r, &z);
         // Accelerations of nearly empty nodes are no place to start from.
-        for k in 0..D {
-            if size[k] < start[k] {
-                continue;
-            }
-            size[k] = start[k];
-            for dof in (k..owned).step_by(D) {
+        let restart: [bool; D] = std::array::from_fn(|k| !(size[k] < whole[k]));
+        if restart.contains(&true) {
+            for dof in (0..owned).filter(|dof| restart[dof % D]) {
                 (x[dof], r[dof]) = (0.0, b[dof]);
             }
+            precondition(&r, &mut z);
+            size = dot(&r, &z);
         }
         let mut factor = [0.0; D];
         let mut iteration = 0;
         loop {
             let active: [bool; D] =
-                std::array::from_fn(|k| size[k] > TOLERANCE * TOLERANCE * start[k]);
+                std::array::from_fn(|k| size[k] > TOLERANCE * TOLERANCE * whole[k]);
             if !active.contains(&true) {
                 break;
             }
             if iteration == MOST_ITERATIONS || size.iter().any(|s| !s.is_finite()) {
-                let worst = size.iter().zip(&start).map(|(s, t)| s / t).fold(0.0, f64::max).sqrt();
+                let worst = size.iter().zip(&whole).map(|(s, t)| s / t).fold(0.0, f64::max).sqrt();
                 if worst <= ACCEPTABLE {
                     break;
                 }
@@ -201,14 +217,14 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                      stabilise it ([ghost] mass_factor = 0.25) or use method.mass = \"lumped\""
                 )));
             }
-            for (node, (p, r)) in p.chunks_exact_mut(D).zip(r.chunks_exact(D)).enumerate() {
+            for (p, z) in p.chunks_exact_mut(D).zip(z.chunks_exact(D)) {
                 for k in 0..D {
-                    p[k] = inverse[node] * r[k] + factor[k] * p[k];
+                    p[k] = z[k] + factor[k] * p[k];
                 }
             }
             self.numbering.halo.forward(world, &mut p, D)?;
             self.multiply_free(&p, &mut product);
-            let curvature = dot(&p[..owned], &product, false);
+            let curvature = dot(&p[..owned], &product);
             if (0..D).any(|k| active[k] && curvature[k] <= 0.0) {
                 return Err(Error::Run(
                     "the consistent mass matrix is not positive definite; stabilise it ([ghost] \
@@ -218,11 +234,17 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             }
             let length: [f64; D] =
                 std::array::from_fn(|k| if active[k] { size[k] / curvature[k] } else { 0.0 });
-            for dof in 0..owned {
-                x[dof] += length[dof % D] * p[dof];
-                r[dof] -= length[dof % D] * product[dof];
+            let updated = x.chunks_exact_mut(D).zip(r.chunks_exact_mut(D));
+            for ((x, r), (p, product)) in
+                updated.zip(p.chunks_exact(D).zip(product.chunks_exact(D)))
+            {
+                for k in 0..D {
+                    x[k] += length[k] * p[k];
+                    r[k] -= length[k] * product[k];
+                }
             }
-            let next = dot(&r, &r, true);
+            precondition(&r, &mut z);
+            let next = dot(&r, &z);
             for k in 0..D {
                 factor[k] = if active[k] { next[k] / size[k] } else { 0.0 };
                 if active[k] {

@@ -13,6 +13,7 @@
 //! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
 //! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
+//! | `lines.rs` | its preconditioner: tridiagonal factors along grid lines |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
@@ -25,6 +26,7 @@ pub mod graph;
 pub mod internal;
 pub mod inverse;
 mod kernel;
+mod lines;
 pub mod manufactured;
 pub mod mass;
 pub mod node_index;

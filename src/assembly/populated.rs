@@ -27,42 +27,83 @@ impl Populated {
         basis: Basis,
         points: &Points<D>,
     ) -> Result<Self> {
-        let mut bodies_of: FxHashMap<usize, u64> = FxHashMap::default();
+        let mut met: Vec<(usize, u64)> = Vec::with_capacity(points.len());
         let mut cells = Vec::new();
         let mut scan = || -> Result<()> {
             for p in 0..points.len() {
                 cells.clear();
                 basis::populated_cells(grid, basis, points, p, &mut cells)?;
+                let body = 1 << points.body[p];
                 for &cell in &cells {
-                    *bodies_of.entry(cell).or_default() |= 1 << points.body[p];
+                    match met.last_mut() {
+                        Some((last, bodies)) if *last == cell => *bodies |= body,
+                        _ => met.push((cell, body)),
+                    }
                 }
             }
             Ok(())
         };
         let scanned = scan();
         world.fail_together(scanned)?;
-
-        let mut reached: Vec<usize> = bodies_of.keys().copied().collect();
-        reached.sort_unstable();
+        let met = united(met);
+        let reached: Vec<usize> = met.iter().map(|&(cell, _)| cell).collect();
 
         let here = world.rank();
         let mut outgoing: FxHashMap<usize, Vec<u64>> = FxHashMap::default();
-        let mut owned: FxHashMap<usize, u64> = FxHashMap::default();
-        for &cell in &reached {
+        let mut owned: Vec<(usize, u64)> = Vec::with_capacity(met.len());
+        for &(cell, bodies) in &met {
             let owner = partition.owner_of_cell(grid, cell);
             if owner == here {
-                *owned.entry(cell).or_default() |= bodies_of[&cell];
+                owned.push((cell, bodies));
             } else {
-                outgoing.entry(owner).or_default().extend([cell as u64, bodies_of[&cell]]);
+                outgoing.entry(owner).or_default().extend([cell as u64, bodies]);
             }
         }
+        let alone = owned.len();
         for (_, words) in exchange(world, outgoing.into_iter().collect())? {
-            for record in words.chunks_exact(2) {
-                *owned.entry(record[0] as usize).or_default() |= record[1];
-            }
+            owned.extend(words.chunks_exact(2).map(|record| (record[0] as usize, record[1])));
         }
-        let mut owned: Vec<(usize, u64)> = owned.into_iter().collect();
-        owned.sort_unstable();
+        if owned.len() > alone {
+            owned = united(owned);
+        }
         Ok(Populated { reached, owned })
+    }
+}
+
+/// Entries ascending by cell, those of one cell joined: by a table where the cells lie close
+/// together, by sorting where they do not.
+fn united(mut entries: Vec<(usize, u64)>) -> Vec<(usize, u64)> {
+    let cells = || entries.iter().map(|&(cell, _)| cell);
+    let (Some(low), Some(high)) = (cells().min(), cells().max()) else { return entries };
+    if (high - low) / 16 > entries.len() {
+        entries.sort_unstable();
+        entries.dedup_by(|next, kept| {
+            let same = next.0 == kept.0;
+            if same {
+                kept.1 |= next.1;
+            }
+            same
+        });
+        return entries;
+    }
+    let mut bodies_of = vec![0u64; high - low + 1];
+    for (cell, bodies) in entries {
+        bodies_of[cell - low] |= bodies;
+    }
+    let marked = bodies_of.into_iter().enumerate().filter(|(_, bodies)| *bodies != 0);
+    marked.map(|(at, bodies)| (low + at, bodies)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::united;
+
+    #[test]
+    fn table_and_sorting_agree() {
+        for spread in [1, 1 << 40] {
+            let entries = [(7 * spread, 1), (3 * spread, 2), (7 * spread, 4), (3 * spread, 2)];
+            assert_eq!(united(entries.to_vec()), [(3 * spread, 2), (7 * spread, 5)]);
+        }
+        assert!(united(Vec::new()).is_empty());
     }
 }

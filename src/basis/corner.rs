@@ -22,8 +22,10 @@ pub struct Corners<const D: usize> {
 }
 
 impl<const D: usize> Corners<D> {
-    /// Replaces `row` by the merged row of point `p`.
-    pub(super) fn fill(
+    /// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending.
+    ///
+    /// Error: a corner beyond reach.
+    pub fn fill(
         &self,
         grid: &Grid<D>,
         points: &Points<D>,
@@ -37,6 +39,22 @@ impl<const D: usize> Corners<D> {
         row.merge();
         Ok(())
     }
+}
+
+/// Appends the cells that hold the corners of a domain of point `p`, ascending.
+///
+/// Error: a corner beyond reach.
+pub(super) fn populated_cells<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    corners: &[[f64; D]; 8],
+    out: &mut Vec<usize>,
+) -> Result<()> {
+    let start = out.len();
+    for_each_place(grid, points, p, corners, |_, at| out.push(at.cell))?;
+    super::row::sort_tail(out, start);
+    Ok(())
 }
 
 /// Calls `visit` with each corner's number and the grid's basis there. Corners on a face count

@@ -9,22 +9,10 @@
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::grid::element::{determinant, inverse};
+use crate::grid::lattice::CORNER_SIGNS;
 use crate::points::Points;
 
-use super::Row;
 use super::corner::{Corners, for_each_place};
-
-/// Signs of the corners in hex8 order.
-const SIGNS: [[f64; 3]; 8] = [
-    [-1.0, -1.0, -1.0],
-    [1.0, -1.0, -1.0],
-    [1.0, 1.0, -1.0],
-    [-1.0, 1.0, -1.0],
-    [-1.0, -1.0, 1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, 1.0, 1.0],
-    [-1.0, 1.0, 1.0],
-];
 
 /// H_0, m: column j is the half edge j of the domain before any deformation. It is read from
 /// the corners the point was seeded with, which `cpdi1` never moves (a sub-cell of a mesh gives
@@ -35,7 +23,7 @@ const SIGNS: [[f64; 3]; 8] = [
 pub fn half_edges_initial<const D: usize>(points: &Points<D>, p: usize) -> [[f64; D]; D] {
     let corners = &points.corners[p];
     let mut edges = [[0.0; D]; D];
-    for (x, sign) in corners.iter().zip(&SIGNS).take(1 << D) {
+    for (x, sign) in corners.iter().zip(&CORNER_SIGNS).take(1 << D) {
         for (row, x) in edges.iter_mut().zip(x) {
             for (entry, sign) in row.iter_mut().zip(sign) {
                 *entry += sign * x / f64::from(1u32 << D);
@@ -71,7 +59,7 @@ pub fn corner_positions<const D: usize>(points: &Points<D>, p: usize) -> [[f64; 
 
 fn positions<const D: usize>(centre: &[f64; D], edges: &[[f64; D]; D]) -> [[f64; D]; 8] {
     let mut corners = [[0.0; D]; 8];
-    for (corner, sign) in corners.iter_mut().zip(&SIGNS).take(1 << D) {
+    for (corner, sign) in corners.iter_mut().zip(&CORNER_SIGNS).take(1 << D) {
         *corner = std::array::from_fn(|i| {
             centre[i] + edges[i].iter().zip(sign).map(|(e, s)| e * s).sum::<f64>()
         });
@@ -95,7 +83,7 @@ pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D
         weights: [0.0; 8],
         gradients: [[0.0; D]; 8],
     };
-    for (corner, sign) in SIGNS.iter().enumerate().take(1 << D) {
+    for (corner, sign) in CORNER_SIGNS.iter().enumerate().take(1 << D) {
         out.weights[corner] = share;
         out.gradients[corner] = std::array::from_fn(|i| {
             share * inverse.iter().zip(sign).map(|(row, s)| s * row[i]).sum::<f64>()
@@ -104,22 +92,10 @@ pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D
     Ok(out)
 }
 
-/// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending.
-///
-/// Errors: the domain has no volume; a corner outside the grid.
-pub fn influence<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    row: &mut Row<D>,
-) -> Result<()> {
-    corners(points, p)?.fill(grid, points, p, row)
-}
-
 /// Whether the step leaves point `p` a sound domain inside `after`, the grid of the next step:
 /// `increment` is the step's dF and `displacement` the point's, m.
 ///
-/// Errors: as of [`influence`].
+/// Errors: a corner outside `after`.
 pub fn check_step<const D: usize>(
     after: &Grid<D>,
     points: &Points<D>,
@@ -133,18 +109,4 @@ pub fn check_step<const D: usize>(
     });
     let centre = std::array::from_fn(|a| points.position[p][a] + displacement[a]);
     for_each_place(after, points, p, &positions(&centre, &edges), |_, _| ())
-}
-
-/// Appends the cells that hold the corners of point `p`, ascending.
-pub fn populated_cells<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    out: &mut Vec<usize>,
-) -> Result<()> {
-    let start = out.len();
-    let corners = corner_positions(points, p);
-    for_each_place(grid, points, p, &corners, |_, at| out.push(at.cell))?;
-    super::row::sort_tail(out, start);
-    Ok(())
 }

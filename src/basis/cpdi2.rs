@@ -18,7 +18,6 @@ use crate::grid::element::{Element, determinant, inverse, jacobian};
 use crate::grid::quadrature::gauss_rule;
 use crate::points::Points;
 
-use super::Row;
 use super::corner::{Corners, for_each_place};
 
 /// Volume (area in 2D) of a domain, m^D; negative if it is inside out.
@@ -118,31 +117,6 @@ fn sound<const D: usize>(
         points.position[p],
         &positions[..1 << D]
     )))
-}
-
-/// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending.
-///
-/// Errors: the domain is inverted; a corner outside the grid.
-pub fn influence<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    row: &mut Row<D>,
-) -> Result<()> {
-    corners(points, p)?.fill(grid, points, p, row)
-}
-
-/// Appends the cells that hold the corners of point `p`, ascending.
-pub fn populated_cells<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    out: &mut Vec<usize>,
-) -> Result<()> {
-    let start = out.len();
-    for_each_place(grid, points, p, &points.corners[p], |_, at| out.push(at.cell))?;
-    super::row::sort_tail(out, start);
-    Ok(())
 }
 
 /// Moves the corners of all points with the step's nodal displacement (m, zero where no

@@ -5,13 +5,32 @@
 use nalgebra::Matrix3;
 
 use super::*;
-use crate::basis::cpdi1;
+use crate::basis::{Row, cpdi1};
+use crate::deck::model::Basis;
 use crate::grid::generate::{annulus, box_mesh};
 use crate::grid::{Lattice, Mesh};
 use crate::points::rectangle_corners;
 
 type Influence<const D: usize> =
     fn(&Grid<D>, &Points<D>, usize, &mut Row<D>) -> crate::error::Result<()>;
+
+fn influence1<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    row: &mut Row<D>,
+) -> Result<()> {
+    cpdi1::corners(points, p)?.fill(grid, points, p, row)
+}
+
+fn influence2<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    p: usize,
+    row: &mut Row<D>,
+) -> Result<()> {
+    corners(points, p)?.fill(grid, points, p, row)
+}
 
 fn point<const D: usize>(x: [f64; D], half: [f64; D]) -> Points<D> {
     let mut points = Points::default();
@@ -107,11 +126,11 @@ fn moments_hold_on_lattices_and_meshes() {
         (ring(Element::Tri3), [7.3, 1.1], shifted),
     ] {
         let points = strained(point(centre, [0.5, 0.3]));
-        cpdi1::influence(&grid, &points, 0, &mut row).unwrap();
+        influence1(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, centre);
         assert!(row.cells().len() > 2);
         let points = polygon(&corners);
-        influence(&grid, &points, 0, &mut row).unwrap();
+        influence2(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, points.position[0]);
         assert!(row.cells().len() > 2);
     }
@@ -128,10 +147,10 @@ fn moments_hold_on_lattices_and_meshes() {
     };
     for grid in [hex_lattice(), boxed(Element::Hex8), boxed(Element::Tet4)] {
         let points = strained(point([0.35, 0.2, 0.1], [0.4, 0.35, 0.3]));
-        cpdi1::influence(&grid, &points, 0, &mut row).unwrap();
+        influence1(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, [0.35, 0.2, 0.1]);
         let points = polygon(&hex([0.35, 0.2, 0.1], 0.4));
-        influence(&grid, &points, 0, &mut row).unwrap();
+        influence2(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, points.position[0]);
     }
 }
@@ -243,7 +262,7 @@ fn a_rectangle_inside_a_box_cell_gives_the_standard_functions() {
         let (mut plain, mut row) = (Row::default(), Row::default());
         plain.add_place(&at);
         plain.merge();
-        let both: [Influence<D>; 2] = [cpdi1::influence, influence];
+        let both: [Influence<D>; 2] = [influence1, influence2];
         for basis in both {
             basis(grid, &points, 0, &mut row).unwrap();
             assert_eq!(row.cells(), [at.cell]);
@@ -271,7 +290,7 @@ fn a_domain_across_a_node_has_known_weights() {
     let grid = quad_lattice();
     let points = point([0.5, 1.2], [0.25, 0.2]);
     let mut row = Row::default();
-    cpdi1::influence(&grid, &points, 0, &mut row).unwrap();
+    influence1(&grid, &points, 0, &mut row).unwrap();
     assert_eq!((row.entries().len(), row.cells().len()), (9, 4));
     let line = [0.25, 0.5, 0.25];
     let slope = [-1.0, 0.0, 1.0];
@@ -282,7 +301,7 @@ fn a_domain_across_a_node_has_known_weights() {
         assert!((ds[1] - line[i] * slope[j] / 0.8).abs() < 1e-13);
     }
     let mut cells = vec![99];
-    cpdi1::populated_cells(&grid, &points, 0, &mut cells).unwrap();
+    crate::basis::populated_cells(&grid, Basis::Cpdi1, &points, 0, &mut cells).unwrap();
     assert_eq!(cells[0], 99);
     assert_eq!(&cells[1..], row.cells());
 }
@@ -297,7 +316,7 @@ fn moved_corners_have_the_area_of_the_mean_gradient() {
         [0.1 * x * y - 0.05 * y * y, 0.07 * x * x + 0.04 * y]
     };
     let mut row = Row::default();
-    influence(&grid, &points, 0, &mut row).unwrap();
+    influence2(&grid, &points, 0, &mut row).unwrap();
     let mut increment = Matrix3::identity();
     for (node, _, ds) in row.entries() {
         let u = u(*node);
@@ -358,10 +377,10 @@ fn a_corner_just_outside_keeps_the_moments_and_one_far_outside_is_an_error() {
     let grid = quad_lattice();
     let mut row = Row::default();
     let points = point([-0.95, 1.5], [0.1, 0.1]);
-    cpdi1::influence(&grid, &points, 0, &mut row).unwrap();
+    influence1(&grid, &points, 0, &mut row).unwrap();
     check_moments(&grid, &row, [-0.95, 1.5]);
     let points = point([-0.95, 1.5], [0.3, 0.1]);
-    let both: [Influence<2>; 2] = [cpdi1::influence, influence];
+    let both: [Influence<2>; 2] = [influence1, influence2];
     for basis in both {
         let error = basis(&grid, &points, 0, &mut row).unwrap_err();
         assert_eq!(error.exit_code(), 1);
@@ -379,11 +398,11 @@ fn inverted_domains_are_refused() {
     let mut row = Row::default();
     let mut points = point([0.5, 1.5], [0.2, 0.2]);
     points.corners[0] = rectangle_corners([0.5, 1.5], [-0.2, 0.2]);
-    let text = influence(&grid, &points, 0, &mut row).unwrap_err().to_string();
+    let text = influence2(&grid, &points, 0, &mut row).unwrap_err().to_string();
     assert!(text.contains("point 41") && text.contains("inverted"), "{text}");
     points.corners[0] = rectangle_corners([0.5, 1.5], [0.2, 0.2]);
     points.deformation_gradient[0][(1, 1)] = -0.5;
-    let text = cpdi1::influence(&grid, &points, 0, &mut row).unwrap_err().to_string();
+    let text = influence1(&grid, &points, 0, &mut row).unwrap_err().to_string();
     assert!(text.contains("point 41") && text.contains("inverted"), "{text}");
     // The displacement that turns a domain over is caught when it happens.
     points.corners[0] = rectangle_corners([0.5, 1.5], [0.2, 0.2]);

@@ -28,8 +28,8 @@ use crate::tensor::spectral::square_root;
 /// Updates `points.half_length` at the end of a step: after `deformation_gradient` has become
 /// that of the step's end, while `position` and `half_length` are still those of its start.
 ///
-/// `increments` holds dF, one for each point (its value is read for `normal-incremental`), `displacement` gives the
-/// step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
+/// `increments` holds dF, one for each point (only read, and else may be empty, for
+/// `normal-incremental`), `displacement` gives the step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
 /// point's own row of [`map_points`](super::map_points) (read for `corners`).
 ///
 /// Errors: a half length that is zero or not finite, and det F <= 0 where its root is needed,
@@ -55,8 +55,10 @@ pub fn update_domains<const D: usize>(
         }
         return Ok(());
     }
-    assert_eq!(increments.len(), points.len(), "one increment for each point");
-    for (p, increment) in increments.iter().enumerate() {
+    if rule == DomainUpdate::NormalIncremental && basis == Basis::Gimp {
+        assert_eq!(increments.len(), points.len(), "one increment for each point");
+    }
+    for p in 0..points.len() {
         let gradient = &points.deformation_gradient[p];
         let initial = &points.half_length_initial[p];
         let new = match (basis, rule) {
@@ -77,8 +79,8 @@ pub fn update_domains<const D: usize>(
             }
             (_, DomainUpdate::NormalIncremental) => {
                 let before = &points.half_length[p];
-                let lengths = scaled_by_diagonal(before, increment);
-                with_product(lengths, increment.determinant() * product(before))
+                let lengths = scaled_by_diagonal(before, &increments[p]);
+                with_product(lengths, increments[p].determinant() * product(before))
             }
             (_, DomainUpdate::Corners) => {
                 let lengths = extent_of_moved_sides(grid, points, p, displacement)?;

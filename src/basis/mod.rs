@@ -103,8 +103,12 @@ pub fn map_points<const D: usize>(
     match basis {
         Basis::Mpm => mpm::map_points(grid, points),
         Basis::Gimp => gimp::map_points(grid, points),
-        Basis::Cpdi1 => row::map_points(points, |p, row| cpdi1::influence(grid, points, p, row)),
-        Basis::Cpdi2 => row::map_points(points, |p, row| cpdi2::influence(grid, points, p, row)),
+        Basis::Cpdi1 => {
+            row::map_points(points, |p, row| cpdi1::corners(points, p)?.fill(grid, points, p, row))
+        }
+        Basis::Cpdi2 => {
+            row::map_points(points, |p, row| cpdi2::corners(points, p)?.fill(grid, points, p, row))
+        }
     }
 }
 
@@ -120,8 +124,10 @@ pub fn populated_cells<const D: usize>(
     match basis {
         Basis::Mpm => mpm::populated_cells(grid, points, p, out),
         Basis::Gimp => gimp::populated_cells(grid, points, p, out),
-        Basis::Cpdi1 => cpdi1::populated_cells(grid, points, p, out),
-        Basis::Cpdi2 => cpdi2::populated_cells(grid, points, p, out),
+        Basis::Cpdi1 => {
+            corner::populated_cells(grid, points, p, &cpdi1::corner_positions(points, p), out)
+        }
+        Basis::Cpdi2 => corner::populated_cells(grid, points, p, &points.corners[p], out),
     }
 }
 

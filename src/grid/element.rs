@@ -12,7 +12,7 @@
 
 pub use crate::deck::model::Element;
 
-use super::lattice::CELL_CORNERS;
+use super::lattice::{CELL_CORNERS, CORNER_SIGNS};
 
 const TRI_FACES: [&[usize]; 3] = [&[0, 1], &[1, 2], &[2, 0]];
 const QUAD_FACES: [&[usize]; 4] = [&[0, 1], &[1, 2], &[2, 3], &[3, 0]];
@@ -55,7 +55,7 @@ impl Element {
         if self.is_simplex() {
             std::array::from_fn(|a| if a + 1 == node { 1.0 } else { 0.0 })
         } else {
-            std::array::from_fn(|a| 2.0 * CELL_CORNERS[node][a] as f64 - 1.0)
+            std::array::from_fn(|a| CORNER_SIGNS[node][a])
         }
     }
 
@@ -88,6 +88,34 @@ impl Element {
             squares += excess(axis).max(0.0).powi(2);
         }
         if worst > 0.0 { squares.sqrt() } else { worst }
+    }
+
+    /// The face that `xi` is furthest beyond (inside: the nearest one), an index of
+    /// [`Self::faces`].
+    pub fn face_towards<const D: usize>(self, xi: &[f64; D]) -> usize {
+        // Per dimension: the face where coordinate `axis` of a simplex is zero; the lower and
+        // upper face along `axis` of a box.
+        const ZERO: [[usize; 3]; 2] = [[2, 0, 0], [3, 1, 0]];
+        const ENDS: [[[usize; 2]; 3]; 2] = [[[3, 1], [0, 2], [0, 0]], [[5, 3], [2, 4], [0, 1]]];
+        let (mut worst, mut towards) = (f64::NEG_INFINITY, 0);
+        let mut consider = |excess: f64, face: usize| {
+            if excess > worst {
+                (worst, towards) = (excess, face);
+            }
+        };
+        if self.is_simplex() {
+            consider(xi.iter().sum::<f64>() - 1.0, D - 1);
+        }
+        for axis in 0..D {
+            if self.is_simplex() {
+                consider(-xi[axis], ZERO[D - 2][axis]);
+            } else {
+                let [lower, upper] = ENDS[D - 2][axis];
+                consider(-1.0 - xi[axis], lower);
+                consider(xi[axis] - 1.0, upper);
+            }
+        }
+        towards
     }
 
     /// N_a(xi).
@@ -254,6 +282,28 @@ mod tests {
                 [r[0] + wobble, 0.7 * r[1] - wobble + 0.3 * r[0], 1.3 * r[2] + 0.5 * wobble]
             })
             .collect()
+    }
+
+    #[test]
+    fn faces_are_named_by_the_side_they_are_on() {
+        fn each<const D: usize>(element: Element) {
+            let inside = element.reference_centre::<D>();
+            for (face, nodes) in element.faces().iter().enumerate() {
+                let middle: [f64; D] = std::array::from_fn(|a| {
+                    let sum = nodes.iter().map(|&n| element.reference_node::<D>(n)[a]).sum::<f64>();
+                    sum / nodes.len() as f64
+                });
+                for reach in [0.9, 1.0, 2.5] {
+                    let xi: [f64; D] =
+                        std::array::from_fn(|a| inside[a] + reach * (middle[a] - inside[a]));
+                    assert_eq!(element.face_towards(&xi), face, "{element:?} {xi:?}");
+                }
+            }
+        }
+        each::<2>(Element::Tri3);
+        each::<2>(Element::Quad4);
+        each::<3>(Element::Tet4);
+        each::<3>(Element::Hex8);
     }
 
     fn check<const D: usize>(element: Element, nodes: &[[f64; D]], xi: [f64; D]) {

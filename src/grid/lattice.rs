@@ -19,6 +19,18 @@ pub const LINE_TOLERANCE: f64 = 1e-10;
 pub const CELL_CORNERS: [[usize; 3]; 8] =
     [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]];
 
+/// The same corners seen from the middle of a box, in half lengths: reference coordinates of
+/// quad4 (first four, first two columns) and hex8.
+pub const CORNER_SIGNS: [[f64; 3]; 8] = {
+    let mut signs = [[0.0; 3]; 8];
+    let mut entry = 0;
+    while entry < 24 {
+        signs[entry / 3][entry % 3] = 2.0 * CELL_CORNERS[entry / 3][entry % 3] as f64 - 1.0;
+        entry += 1;
+    }
+    signs
+};
+
 impl<const D: usize> Lattice<D> {
     /// Nodes per axis.
     pub fn nodes(&self) -> [usize; D] {

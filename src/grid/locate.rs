@@ -14,6 +14,10 @@ pub const EDGE_TOLERANCE: f64 = 5e-10;
 /// Furthest reach of [`Mesh::locate_near`] outside the mesh, as a fraction of the cell's extent.
 pub const REACH: f64 = 0.25;
 
+/// Cells that [`Mesh::walk`] looks at: three strides cross any of the cells that a box was cut
+/// into, and neighbouring points are seldom more than a box apart.
+const STRIDES: usize = 5;
+
 /// Cells by the bins their bounding boxes overlap, in compressed rows.
 #[derive(Debug, Clone)]
 pub(super) struct Bins<const D: usize> {
@@ -139,8 +143,8 @@ impl<const D: usize> Mesh<D> {
 
     /// The cell that holds `x` and the reference coordinates there. Where no cell does, the
     /// outer cell that misses `x` by the smallest fraction of its extent, if that is at most
-    /// `allowance` (up to [`REACH`]). A `hint` saves the search when `x` is well inside that
-    /// cell; it never changes the answer.
+    /// `allowance` (up to [`REACH`]). A `hint` saves the search when `x` is well inside a cell
+    /// near that one; it never changes the answer.
     pub fn locate_near(
         &self,
         x: &[f64; D],
@@ -150,11 +154,8 @@ impl<const D: usize> Mesh<D> {
         if self.folded {
             return self.deepest(x).or_else(|| self.nearest(x, allowance));
         }
-        if let Some(cell) = hint
-            && let Some((xi, outside)) = self.reference_of(cell, x, 0.0)
-            && outside < -EDGE_TOLERANCE
-        {
-            return Some((cell, xi));
+        if let Some(found) = hint.and_then(|cell| self.walk(cell, x)) {
+            return Some(found);
         }
         for &cell in self.bins.candidates(x) {
             if let Some((xi, outside)) = self.reference_of(cell as usize, x, 0.0)
@@ -164,6 +165,25 @@ impl<const D: usize> Mesh<D> {
             }
         }
         self.nearest(x, allowance)
+    }
+
+    /// From `cell` across the face that `x` is furthest beyond, again and again. A cell counts
+    /// only if it holds `x` well inside: then no other does.
+    fn walk(&self, mut cell: usize, x: &[f64; D]) -> Option<(usize, [f64; D])> {
+        for _ in 0..STRIDES {
+            let positions = self.cell_positions(cell);
+            let nodes = &positions[..self.element.node_count()];
+            let xi = element::inverse_map(self.element, nodes, x)?;
+            if self.element.outside(&xi) < -EDGE_TOLERANCE {
+                return Some((cell, xi));
+            }
+            let next = self.across_raw(cell)[self.element.face_towards(&xi)];
+            if next == OUTSIDE {
+                return None;
+            }
+            cell = next as usize;
+        }
+        None
     }
 
     /// Of the overlapping cells of a folded mesh, the one that holds `x` furthest from its edge,

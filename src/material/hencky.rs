@@ -45,7 +45,7 @@ impl Hencky {
         0.5 * self.lambda * trace * trace + self.mu * square
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn respond(&self, trial: [f64; 3]) -> Response {
         let mut tangent = [[self.lambda; 3]; 3];
         for (a, row) in tangent.iter_mut().enumerate() {

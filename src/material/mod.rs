@@ -58,7 +58,7 @@ impl Material {
     }
 
     /// Stress, strain and tangent for principal trial strains.
-    #[inline]
+    #[inline(always)]
     pub fn respond(&self, trial: [f64; 3]) -> Response {
         match self {
             Material::Hencky(model) => model.respond(trial),

@@ -21,7 +21,7 @@ impl VonMises {
         VonMises { elasticity, yield_stress }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn respond(&self, trial: [f64; 3]) -> Response {
         let two_mu = 2.0 * self.elasticity.mu;
         let mean = (trial[0] + trial[1] + trial[2]) / 3.0;

@@ -66,6 +66,7 @@ pub struct StepStart<'a> {
 
 /// Stress only (explicit steps, last evaluation). det dF < 0 is taken as it comes; a singular
 /// or not finite dF gives stresses that are not finite.
+#[inline]
 pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> StressState {
     update::update(start, increment).state(start.material)
 }

@@ -15,7 +15,7 @@ pub(super) struct Update {
     pub response: Response,
 }
 
-#[inline]
+#[inline(always)]
 pub(super) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -> Update {
     let before = start.elastic_left_cauchy_green;
     let half = dense::multiply(increment, &dense::block::<D>(before));
@@ -31,7 +31,7 @@ pub(super) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -
 }
 
 impl Update {
-    #[inline]
+    #[inline(always)]
     pub(super) fn state(&self, material: &Material) -> StressState {
         let response = &self.response;
         // Without plastic flow b_e is the trial one: no detour through ln and exp, no drift.

@@ -181,7 +181,7 @@ pub struct FailedPoint {
 }
 
 pub fn failure(failure: &Failure) -> String {
-    let mut text = format!("error: {}\n", failure.what);
+    let mut text = format!("{}\n", failure.what);
     if let Some(step) = failure.step {
         let _ = write!(text, "  where: step {step}");
         if let Some(point) = &failure.point {
@@ -348,7 +348,7 @@ results             out/beam
         });
         assert_eq!(
             text,
-            "error: the point is inverted (det F = -0.1)
+            "the point is inverted (det F = -0.1)
   where: step 7, point 12 of body `beam` (hencky) at (1.000000, 2.500000) m
     try: more steps
     try: analysis.on_failure = \"cut\"

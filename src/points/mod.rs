@@ -12,6 +12,8 @@ pub mod sort;
 
 use nalgebra::Matrix3;
 
+use crate::grid::lattice::CORNER_SIGNS;
+
 /// Declares the struct of arrays and everything that must treat each field alike: packing for
 /// migration and checkpoints, reordering, removal. A field is an array of `f64` words per point.
 macro_rules! point_fields {
@@ -152,18 +154,8 @@ impl<const D: usize> Points<D> {
 
 /// Corners of an axis-aligned domain: 2D counter-clockwise from (-,-), 3D in hex8 order.
 pub fn rectangle_corners<const D: usize>(x: [f64; D], half: [f64; D]) -> [[f64; D]; 8] {
-    const SIGNS: [[f64; 3]; 8] = [
-        [-1.0, -1.0, -1.0],
-        [1.0, -1.0, -1.0],
-        [1.0, 1.0, -1.0],
-        [-1.0, 1.0, -1.0],
-        [-1.0, -1.0, 1.0],
-        [1.0, -1.0, 1.0],
-        [1.0, 1.0, 1.0],
-        [-1.0, 1.0, 1.0],
-    ];
     let mut corners = [[0.0; D]; 8];
-    for (corner, sign) in corners.iter_mut().zip(&SIGNS).take(1 << D) {
+    for (corner, sign) in corners.iter_mut().zip(&CORNER_SIGNS).take(1 << D) {
         for axis in 0..D {
             corner[axis] = x[axis] + sign[axis] * half[axis];
         }

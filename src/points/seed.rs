@@ -48,6 +48,7 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
                     Seeding::Gauss(order) => vec![*order; D],
                     Seeding::Lattice { .. } => unreachable!("matched above"),
                 };
+                within_lattice(body, shape, &counts, lattice, share)?;
                 per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
             }
             (BodySource::Shape { shape, seeding }, Grid::Mesh(mesh)) => {
@@ -77,6 +78,53 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
         set_velocity(&mut points, made, body);
     }
     Ok(points)
+}
+
+/// An error where the seeding, carried on beyond the lattice (as far again on each side), would
+/// put a point: part of the body would be missing. A shape without bounds ends at the lattice.
+fn within_lattice<const D: usize>(
+    body: &Body,
+    shape: &Shape,
+    counts: &[usize],
+    lattice: &Lattice<D>,
+    share: Share,
+) -> Result<()> {
+    let Some((min, max)) = shape.bounds() else { return Ok(()) };
+    let cells: [isize; D] = lattice.cells.map(|n| n as isize);
+    let low: [isize; D] =
+        std::array::from_fn(|a| (lattice.scaled(a, min[a]).floor() as isize).max(-cells[a]));
+    let high: [isize; D] =
+        std::array::from_fn(|a| (lattice.scaled(a, max[a]).ceil() as isize).min(2 * cells[a]));
+    if (0..D).all(|a| low[a] >= 0 && high[a] <= cells[a]) {
+        return Ok(());
+    }
+    let size: Vec<usize> = (0..D).map(|a| (high[a] - low[a]).max(0) as usize).collect();
+    let per_cell: usize = counts.iter().product();
+    for candidate in share.of(size.iter().product()) {
+        let at: [usize; D] = split(candidate, &size);
+        let cell: [isize; D] = std::array::from_fn(|a| low[a] + at[a] as isize);
+        if (0..D).all(|a| (0..cells[a]).contains(&cell[a])) {
+            continue;
+        }
+        for sub in 0..per_cell {
+            let part: [usize; D] = split(sub, counts);
+            let x: [f64; D] = std::array::from_fn(|a| {
+                let along = cell[a] as f64 + (part[a] as f64 + 0.5) / counts[a] as f64;
+                lattice.origin[a] + lattice.spacing[a] * along
+            });
+            if shape.contains(&x) {
+                let end: [f64; D] = std::array::from_fn(|a| {
+                    lattice.origin[a] + lattice.spacing[a] * cells[a] as f64
+                });
+                return Err(Error::Input(format!(
+                    "body \"{}\" reaches outside the grid: its shape holds {x:?}, the grid goes \
+                     from {:?} to {end:?}; enlarge the grid, or move or cut the body",
+                    body.name, lattice.origin
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Equal sub-cells of every lattice cell, kept where their centre is inside. Returns the number

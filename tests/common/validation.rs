@@ -1,19 +1,24 @@
-//! Tables of docs/validation.md, rewritten in place by `make validate`.
+//! Tables of the validation pages, rewritten in place by `make validate`.
 
 use std::path::Path;
 use std::sync::Mutex;
 
 static ONE_WRITER: Mutex<()> = Mutex::new(());
 
-/// Replaces what stands between `<!-- table NAME -->` and `<!-- end -->` in docs/validation.md
-/// by this table. Does nothing unless `MPM_PAR_VALIDATION` is set.
+/// [`record_in`] docs/validation.md.
 pub fn record(name: &str, header: &[&str], rows: &[Vec<String>]) {
+    record_in("validation.md", name, header, rows);
+}
+
+/// Replaces what stands between `<!-- table NAME -->` and `<!-- end -->` in a page of docs/ by
+/// this table. Does nothing unless `MPM_PAR_VALIDATION` is set.
+pub fn record_in(page: &str, name: &str, header: &[&str], rows: &[Vec<String>]) {
     if std::env::var_os("MPM_PAR_VALIDATION").is_none() {
         return;
     }
     let _alone = ONE_WRITER.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/validation.md");
-    let text = std::fs::read_to_string(&path).expect("docs/validation.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs").join(page);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("docs/{page}: {e}"));
     let opening = format!("<!-- table {name} -->\n");
     let begin = text.find(&opening).unwrap_or_else(|| panic!("no place for table {name}"));
     let begin = begin + opening.len();
@@ -23,5 +28,5 @@ pub fn record(name: &str, header: &[&str], rows: &[Vec<String>]) {
         table.push_str(&format!("| {} |\n", row.join(" | ")));
     }
     std::fs::write(&path, format!("{}{table}{}", &text[..begin], &text[end..]))
-        .expect("docs/validation.md is writable");
+        .unwrap_or_else(|e| panic!("docs/{page}: {e}"));
 }

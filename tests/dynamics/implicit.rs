@@ -1,5 +1,6 @@
 //! Newmark's method and its dissipative relative on a vibrating bar.
 
+use super::ghosts::contact;
 use crate::common::run::{Results, Run};
 
 fn bar(steps: usize) -> Run {
@@ -62,6 +63,68 @@ fn steps_of_fifty_cells_stay_stable_where_the_end_is_a_sliver() {
             "0.0" => assert!(last > 0.9 * start, "{last} {start}"),
             _ => assert!(last < 0.5 * start, "{last} {start}"),
         }
+    }
+}
+
+/// A ghost with ragged edges that swells and shrinks, in 40 steps of 50 h/c.
+pub fn swelling_ghost() -> Run {
+    let deck = std::fs::read_to_string(crate::common::run::input("stretching-ghost"))
+        .expect("a deck")
+        .replace("stress_update = \"usl\"", "")
+        .replace("scaling = \"published\"", "stiffness_factor = 1.0");
+    let verify = deck.find("[[verify]]").expect("figures of merit");
+    let output = deck.find("[output]").expect("an output table");
+    Run::text(&format!("{}{}", &deck[..verify], &deck[output..]))
+        .set("analysis.type=\"implicit-dynamic\"")
+        .set("analysis.steps=40")
+        // h/c = 0.0431 s with c^2 = 1346 Pa / 1000 kg/m3.
+        .set("analysis.duration=86.2")
+        .set("grid.h=0.05")
+        .set("material.none.young=1000")
+        .set("material.none.poisson=0.3")
+        .set("body.0.velocity=[\"1e-3*(X - 0.5)\", \"1e-3*(Y - 0.5)\"]")
+        .set("output.every=100000")
+}
+
+#[test]
+fn steps_of_fifty_cells_stay_stable_where_all_edges_are_ragged() {
+    let start = {
+        let run = swelling_ghost().set("analysis.steps=1").set("analysis.duration=1e-9");
+        energies(&run.results())[0]
+    };
+    let newmark = energies(&swelling_ghost().results());
+    let highest = newmark.iter().copied().fold(0.0, f64::max);
+    let last = *newmark.last().unwrap();
+    // What is not with the points is with the Ghost share.
+    assert!(highest < start && last > 0.8 * start, "{highest:e} {last:e} {start:e}");
+    let damped = energies(&swelling_ghost().set("analysis.hht_alpha=-0.1").results());
+    assert!(damped.windows(2).all(|pair| pair[1] < pair[0]), "{damped:?}");
+    assert!(*damped.last().unwrap() < 0.3 * start, "{damped:?}");
+}
+
+/// Domains that follow their corners take part as the others do.
+#[test]
+fn cpdi2_works_in_implicit_dynamics() {
+    let cpdi2 = |run: Run| run.set("method.basis=\"cpdi2\"");
+    let errors = [18, 36, 72].map(|steps| error(cpdi2(bar(steps))));
+    for pair in errors.windows(2) {
+        let rate = (pair[0] / pair[1]).log2();
+        assert!((1.8..2.3).contains(&rate), "{errors:?}");
+    }
+    let fall = cpdi2(Run::text(FALL)).results();
+    assert!(fall.verify("displacement_error") < 1e-12);
+
+    let collision = cpdi2(contact(10))
+        .set("analysis.type=\"implicit-dynamic\"")
+        .set("ghost.stiffness_factor=0.1")
+        .set("analysis.duration=0.35")
+        .results();
+    assert!(collision.history("energy_strain").last() > Some(&1e-3), "there was contact");
+    for axis in ["momentum_x", "momentum_y"] {
+        let momentum = collision.history(axis);
+        // 2 x 10.7363 kg m/s are there to be exchanged.
+        let worst = momentum.iter().fold(0.0f64, |worst, p| worst.max(p.abs()));
+        assert!(worst < 1e-7 * 21.4726, "{axis}: {worst:e}");
     }
 }
 

@@ -1,15 +1,21 @@
 //! The dynamic cases of the Ghost paper, and what must hold of any dynamic run: each test runs
 //! decks of `inputs/` through the program. The longer ones are run by `make validate`, which
-//! also writes `docs/validation-dynamics.md`.
+//! also rewrites the tables of `docs/validation-dynamics.md`.
 
 #[path = "../common/mod.rs"]
 mod common;
+#[path = "../common/program.rs"]
+mod program;
 
 mod conditioning;
 mod conservation;
 mod faults;
+mod figure_14;
 mod ghosts;
 mod implicit;
 mod ranks;
+mod report;
+mod restart;
+mod space;
 mod stretch;
-mod validation;
+mod table_3;

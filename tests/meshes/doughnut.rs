@@ -1,7 +1,7 @@
 //! Doughnut twist: Rotation §3.2, Figures 6, 7, 8 and 11.
 
 use crate::axisymmetric;
-use crate::common::run::{Results, Run};
+use crate::common::run::{Results, Run, input};
 
 const MPM: &str = "method.basis=\"mpm\"";
 const CPDI1: &str = "method.basis=\"cpdi1\"";
@@ -12,7 +12,11 @@ const INNER: std::ops::Range<usize> = 1..10;
 
 /// Displacement of the sampling points of `doughnut-10.toml` after 10 degrees, from R = 5 to 10.
 fn radius(results: &Results) -> Vec<[f64; 2]> {
-    let points = results.points(2);
+    radius_after(results, 2)
+}
+
+fn radius_after(results: &Results, step: usize) -> Vec<[f64; 2]> {
+    let points = results.points(step);
     let u = points.field("displacement");
     let rows: Vec<[f64; 2]> = u.chunks_exact(3).map(|row| [row[0], row[1]]).collect();
     // The body "radius" comes second, so its identities are the largest.
@@ -41,39 +45,94 @@ fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }
 
-/// The paper prints < 0.05 % (mpm), < 1 % (cpdi2) and < 5 % (cpdi1). With 2 x 2 points `mpm`
-/// exceeds its bound at one node, where all points of a ring have come to lie on cell edges.
+/// Bounds printed in the paper.
+const MPM_PRINTED: f64 = 5e-4;
+const CPDI1_PRINTED: f64 = 0.05;
+const CPDI2_PRINTED: f64 = 0.01;
+
+/// cpdi1 and cpdi2 stay below their printed bounds at every node. `mpm` does in the mean, and at
+/// every node as a fraction of the prescribed displacement; relative to each node's own
+/// displacement it exceeds the bound, by less than the mesh itself is off (8.5e-4).
 fn assert_figure_6(control: &[[f64; 2]]) {
+    let found = radius(&small(MPM).results());
+    let mpm = differences(&found, control);
+    assert!(mean(&mpm) < MPM_PRINTED && largest(&mpm) < 7e-4, "{mpm:?}");
+    let (found, sizes) = (sizes(&found), sizes(control));
+    let of_prescribed = INNER.map(|k| (found[k] - sizes[k]).abs() / sizes[0]).collect::<Vec<_>>();
+    assert!(largest(&of_prescribed) < MPM_PRINTED, "{of_prescribed:?}");
     let against = |method: &str| differences(&radius(&small(method).results()), control);
-    let mpm = against(MPM);
-    assert!(mean(&mpm) < 5e-4 && largest(&mpm) < 8e-4, "{mpm:?}");
     let cpdi2 = against(CPDI2);
-    assert!(largest(&cpdi2) < 0.01, "{cpdi2:?}");
+    assert!(largest(&cpdi2) < CPDI2_PRINTED, "{cpdi2:?}");
     let cpdi1 = against(CPDI1);
-    assert!(largest(&cpdi1) < 0.05, "{cpdi1:?}");
+    assert!(largest(&cpdi1) < CPDI1_PRINTED, "{cpdi1:?}");
 }
 
 #[test]
 fn ten_degrees_agree_with_finite_elements_on_the_same_mesh() {
     let control = radius(&small(FEM).results());
     assert_figure_6(&control);
-    let more = radius(&small(MPM).set("body.0.points_per_cell=[3, 3]").results());
-    let more = differences(&more, &control);
-    assert!(largest(&more) < 5e-4, "3 x 3 points: {more:?}");
+    for per_cell in [3, 4, 6] {
+        let set = format!("body.0.points_per_cell=[{per_cell}, {per_cell}]");
+        let more = differences(&radius(&small(MPM).set(set).results()), &control);
+        assert!(largest(&more) < MPM_PRINTED, "{per_cell} x {per_cell} points: {more:?}");
+    }
+}
+
+/// Before points have crossed cells, after 5 of the 10 degrees, all nodes are within the bound.
+#[test]
+fn five_degrees_agree_at_every_node() {
+    let exact = axisymmetric::displacement(5.0, 400);
+    let five = |method| {
+        let run = small(method).set("analysis.steps=1").set("boundary.1.rotation.degrees=-5");
+        radius_after(&run.results(), 1)
+    };
+    let mpm = differences(&five(MPM), &exact);
+    assert!(largest(&mpm) < MPM_PRINTED, "{mpm:?}");
+    let mesh = differences(&five(FEM), &exact);
+    assert!(largest(&mesh) < MPM_PRINTED, "{mesh:?}");
 }
 
 #[test]
 #[ignore = "long: make validate"]
 fn ten_degrees_agree_with_fine_finite_elements() {
-    let fine =
-        small(FEM).set("grid.generate.annulus.radial=160").set("grid.generate.annulus.around=1152");
-    let control = radius(&fine.results());
+    let control = radius(&fine(160, 1e-6).results());
     assert_figure_6(&control);
     let coarse = differences(&radius(&small(FEM).results()), &control);
     assert!(largest(&coarse) < 1e-3, "{coarse:?}");
-    // The fine control itself, against the axisymmetric problem.
+}
+
+/// A finite element control whose sampling points have the area `area`, m2.
+fn fine(radial: usize, area: f64) -> Run {
+    let text = std::fs::read_to_string(input("doughnut-10")).expect("a deck of this project");
+    // A body of points each: what a deck can say of its sampling points is their file.
+    let folder = std::env::temp_dir().join(format!("radius-{radial}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a scratch folder");
+    let csv = folder.join("radius.csv");
+    let rows: Vec<String> =
+        (0..=10).map(|k| format!("{},0,{area:e}", 5.0 + 0.5 * f64::from(k))).collect();
+    std::fs::write(&csv, format!("x,y,volume\n{}\n", rows.join("\n"))).expect("writable");
+    let text = text.replace("doughnut-radius.csv", &csv.display().to_string());
+    Run::text(&text)
+        .set(FEM)
+        .set(format!("grid.generate.annulus.radial={radial}"))
+        .set(format!("grid.generate.annulus.around={}", radial / 5 * 36))
+}
+
+/// Sampling points add stiffness of their own: an area a over a cell of size h shifts the
+/// displacement there by about a strain / h, 1.6e-5 at 160 rings with the paper's 1 mm squares.
+/// Without it the fine control follows the second order of the coarser ones: 8.6e-4 / 16^2.
+#[test]
+#[ignore = "long: make validate"]
+fn the_fine_control_has_the_error_of_its_mesh() {
     let exact = axisymmetric::displacement(10.0, 400);
-    assert!(largest(&differences(&control, &exact)) < 3e-5);
+    let error = |radial| largest(&differences(&radius(&fine(radial, 1e-12).results()), &exact));
+    let errors = [10, 20, 40, 80, 160].map(error);
+    for pair in errors.windows(2) {
+        assert!(((pair[0] / pair[1]).log2() - 2.0).abs() < 0.025, "{errors:?}");
+    }
+    assert!(errors[4] < 3.6e-6, "{errors:?}");
+    let heavy = largest(&differences(&radius(&fine(160, 1e-6).results()), &exact));
+    assert!((5e-6..2e-5).contains(&heavy), "{heavy:e}");
 }
 
 /// The coarse control converges at second order to the axisymmetric solution.

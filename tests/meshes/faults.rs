@@ -49,17 +49,27 @@ fn mesh(nodes: &[[f64; 2]], kind: usize, cells: &[&[usize]]) -> String {
     text + "$EndElements\n"
 }
 
-/// Runs the deck on a mesh file; the outcome must have this exit code and these words.
+/// Runs the deck on a mesh file, on one rank and on two; the outcome must have this exit code and
+/// these words, said once.
 #[track_caller]
 fn refused(name: &str, contents: &str, deck: &str, code: i32, words: &[&str]) {
+    for ranks in [1, 2] {
+        refused_on(ranks, name, contents, deck, code, words);
+    }
+}
+
+#[track_caller]
+fn refused_on(ranks: usize, name: &str, contents: &str, deck: &str, code: i32, words: &[&str]) {
     let folder = tempfile::tempdir().expect("a scratch folder");
     std::fs::write(folder.path().join(name), contents).expect("writable");
-    let outcome = Run::text(&deck.replace("MESH", name)).attempt_in(folder);
+    let outcome = Run::text(&deck.replace("MESH", name)).ranks(ranks).attempt_in(folder);
     let said = format!("{}\n{}", outcome.stdout, outcome.stderr);
     assert_eq!(outcome.code, code, "{said}");
     for word in words {
         assert!(outcome.stderr.contains(word), "no `{word}` in:\n{said}");
     }
+    let lines = outcome.stderr.lines().filter(|line| words.iter().all(|w| line.contains(w)));
+    assert!(lines.count() <= 1, "said more than once:\n{said}");
     if code == 2 {
         assert!(!outcome.files().iter().any(|f| f.starts_with("out/")), "nothing half-written");
     }
@@ -142,8 +152,9 @@ fn finite_elements_on_a_lattice() {
 }
 
 /// A block pulled out of a mesh that stays.
-fn pulled(basis: &str, per_cell: usize) -> (i32, String) {
+fn pulled(basis: &str, per_cell: usize, ranks: usize) -> (i32, String) {
     let outcome = Run::of("stretch")
+        .ranks(ranks)
         .set(format!("method.basis=\"{basis}\""))
         .set(format!("body.0.points_per_cell=[{per_cell}, {per_cell}]"))
         .set("grid.motion={ follow = [\"y\"] }")
@@ -154,31 +165,36 @@ fn pulled(basis: &str, per_cell: usize) -> (i32, String) {
 
 #[test]
 fn points_and_corners_that_leave_the_mesh() {
-    let (code, said) = pulled("mpm", 2);
-    assert_eq!(code, 1, "{said}");
-    assert!(said.contains("point ") && said.contains("leaves the grid"), "{said}");
-    for basis in ["cpdi1", "cpdi2"] {
-        let (code, said) = pulled(basis, 1);
+    for ranks in [1, 2] {
+        let (code, said) = pulled("mpm", 2, ranks);
         assert_eq!(code, 1, "{said}");
-        assert!(said.contains("corner ") && said.contains("is outside the grid at"), "{said}");
-        assert!(said.contains("step ") && said.contains("point "), "{said}");
+        assert!(said.contains("point ") && said.contains("leaves the grid"), "{said}");
+        for basis in ["cpdi1", "cpdi2"] {
+            let (code, said) = pulled(basis, 1, ranks);
+            assert_eq!(code, 1, "{said}");
+            assert!(said.contains("corner ") && said.contains("is outside the grid at"), "{said}");
+            assert!(said.contains("step ") && said.contains("point "), "{said}");
+        }
     }
 }
 
 /// In the plane the volume of a CPDI2 domain is that of its point: one says it for both.
 #[test]
 fn domains_that_turn_over() {
-    let outcome = Run::of("stretch")
-        .set("method.basis=\"cpdi2\"")
-        .set("grid.motion=")
-        .set("boundary.2.displacement={ x = -6.0 }")
-        .set("analysis.steps=1")
-        .set("analysis.max_iterations=40")
-        .set("analysis.inverted_iterates=\"allow\"")
-        .attempt();
-    let said = outcome.stderr;
-    assert_eq!(outcome.code, 1, "{said}");
-    for word in ["step 1 of 1", "point ", "is turned inside out (det dF"] {
-        assert!(said.contains(word), "no `{word}` in:\n{said}");
+    for ranks in [1, 2] {
+        let outcome = Run::of("stretch")
+            .ranks(ranks)
+            .set("method.basis=\"cpdi2\"")
+            .set("grid.motion=")
+            .set("boundary.2.displacement={ x = -6.0 }")
+            .set("analysis.steps=1")
+            .set("analysis.max_iterations=40")
+            .set("analysis.inverted_iterates=\"allow\"")
+            .attempt();
+        let said = outcome.stderr;
+        assert_eq!(outcome.code, 1, "{said}");
+        for word in ["step 1 of 1", "point ", "is turned inside out (det dF"] {
+            assert!(said.contains(word), "no `{word}` in:\n{said}");
+        }
     }
 }

@@ -10,11 +10,17 @@ use mpm_par::{deck, parallel};
 
 use crate::common::on_ranks;
 use crate::common::run::{Run, input, relative_difference};
+use crate::{cpdi, ghost};
 
 /// Positions and stresses after `step` on two, three and four ranks against one.
 fn assert_same(name: &str, run: &Run, step: usize) {
+    assert_same_of(name, &|ranks| run.clone().ranks(ranks), step);
+}
+
+/// The same for a run that takes other solver options on several ranks.
+fn assert_same_of(name: &str, run: &dyn Fn(usize) -> Run, step: usize) {
     let fields = |ranks: usize| {
-        let results = run.clone().ranks(ranks).set("output.fields=[\"stress\"]").results();
+        let results = run(ranks).set("output.fields=[\"stress\"]").results();
         let points = results.points(step);
         ["position", "stress"].map(|field| points.field(field).to_vec())
     };
@@ -41,6 +47,12 @@ fn moving_meshes_do_not_depend_on_the_ranks() {
     }
 }
 
+/// CPDI2 over triangles, with Ghost faces across the borders of the partition.
+#[test]
+fn ghost_faces_on_triangles_do_not_depend_on_the_ranks() {
+    assert_same("beam on triangles", &ghost::beam_on_triangles().set("analysis.steps=20"), 20);
+}
+
 #[test]
 #[ignore = "long: make validate"]
 fn all_cases_do_not_depend_on_the_ranks() {
@@ -58,8 +70,8 @@ fn all_cases_do_not_depend_on_the_ranks() {
         assert_same(method, &Run::of("mms-3d-mesh").set(*method), 2);
     }
     assert_same("finite element beam", &Run::of("beam-fem").set("analysis.steps=10"), 10);
-    let collapse = Run::of("collapse").set("method.basis=\"cpdi2\"").set("method.drop_below=1e-5");
-    assert_same("collapse", &collapse, 40);
+    assert_same_of("collapse", &cpdi::collapse, 40);
+    assert_same_of("beam", &|ranks| cpdi::beam(0.25, ranks), 50);
 }
 
 /// Turned by a quarter of a cell under its domains, the partition of the mesh runs through them: rows

@@ -1,0 +1,202 @@
+//! Whole runs of the program: the §7.3 beam, two ranks beside one, memory per point and node.
+//!
+//! `cargo bench --bench runs [-- beam|pairs|memory ...]`. Wall times: on a machine that is busy
+//! they say little; the load is printed beside them.
+
+mod report;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use report::machine;
+
+/// Runs of each kind; pairs alternate one and two ranks.
+const REPEATS: usize = 5;
+
+fn main() {
+    let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
+    let wanted = |name: &str| words.is_empty() || words.iter().any(|word| name.contains(word));
+    println!("machine: {}, load {}", machine(), load());
+    if wanted("beam") {
+        beam();
+    }
+    if wanted("pairs") {
+        pairs("2D gimp, 204 800 points", &["grid.h=0.025"]);
+        pairs(
+            "3D gimp, 216 000 points",
+            &block_3d(30).iter().map(String::as_str).collect::<Vec<_>>(),
+        );
+    }
+    if wanted("memory") {
+        memory();
+    }
+}
+
+/// A finished run's summary.
+struct Summary(serde_json::Value);
+
+impl Summary {
+    fn number(&self, path: &str) -> f64 {
+        self.0.pointer(path).and_then(|value| value.as_f64()).unwrap_or(f64::NAN)
+    }
+
+    fn wall(&self, phase: &str) -> f64 {
+        self.number(&format!("/wall_seconds/{phase}"))
+    }
+}
+
+fn input(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("inputs").join(name)
+}
+
+fn run(ranks: usize, deck: &Path, sets: &[&str]) -> Summary {
+    let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("runs");
+    let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/mpirun.sh");
+    let mut command = Command::new("sh");
+    command.arg(script).arg(ranks.to_string()).arg(env!("CARGO_BIN_EXE_mpm-par")).arg(deck);
+    command.arg("--force").arg("--out").arg(&out);
+    for set in sets {
+        command.arg("--set").arg(set);
+    }
+    command.stdin(Stdio::null()).stdout(Stdio::null());
+    let status = command.status().expect("the program starts");
+    assert!(status.success(), "{} {sets:?} on {ranks} ranks", deck.display());
+    let text = std::fs::read_to_string(out.join("summary.json")).expect("summary.json");
+    Summary(serde_json::from_str(&text).expect("JSON"))
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+fn load() -> String {
+    std::fs::read_to_string("/proc/loadavg")
+        .map_or_else(|_| "unknown".into(), |text| text[..text.len().min(14)].to_string())
+}
+
+/// Lagrangian §7.3 at h = 0.125 m with 6 x 6 points.
+fn beam() {
+    let runs: Vec<Summary> = (0..REPEATS)
+        .map(|_| {
+            let sets = ["grid.h=0.125", "body.0.points_per_cell=[6,6]"];
+            run(1, &input("beam.toml"), &sets)
+        })
+        .collect();
+    let of = |phase: &str| median(runs.iter().map(|run| run.wall(phase)).collect());
+    println!("\nbeam, h = 0.125 m, 6 x 6 points, 1 rank, medians of {REPEATS}");
+    println!(
+        "total {:.2} s: assemble {:.2}, solve {:.2}, locate {:.2}, update {:.2}, output {:.2}; \
+         {} evaluations of {} points; load {}",
+        of("total"),
+        of("assemble"),
+        of("solve"),
+        of("locate"),
+        of("update"),
+        of("output"),
+        runs[0].number("/newton_iterations/total"),
+        runs[0].number("/points"),
+        load()
+    );
+}
+
+/// The block of `inputs/scaling.toml` as a cube of `cells` a side.
+fn block_3d(cells: usize) -> Vec<String> {
+    let h = 1.0 / cells as f64;
+    [
+        format!("grid.h={h}"),
+        "grid.origin=[0.0,0.0,0.0]".into(),
+        format!("grid.size=[{a},{a},{a}]", a = 1.0 + 2.0 * h),
+        "body.0.shape={box={min=[0,0,0],max=[1,1,1]}}".into(),
+        "body.0.points_per_cell=[2,2,2]".into(),
+        "boundary.1.fix=[\"x\"]".into(),
+        "boundary.0.where={side=\"back\"}".into(),
+        "boundary.0.fix=[\"z\",\"y\"]".into(),
+        "load.0.gravity=[0,0,-10]".into(),
+        "analysis.steps=1".into(),
+    ]
+    .into()
+}
+
+/// Two ranks beside one, in turn.
+fn pairs(name: &str, sets: &[&str]) {
+    let mut runs = [Vec::new(), Vec::new()];
+    for _ in 0..REPEATS {
+        for ranks in [1, 2] {
+            runs[ranks - 1].push(run(ranks, &input("scaling.toml"), sets));
+        }
+    }
+    println!("\ntwo ranks over one: {name}, {REPEATS} pairs in turn, medians");
+    println!("| phase | 1 rank, s | 2 ranks, s | ratio of medians | ratios of the pairs |");
+    println!("|---|---|---|---|---|");
+    for phase in ["total", "solve", "assemble", "locate", "setup", "update", "migrate", "output"] {
+        let times = [0, 1].map(|k| runs[k].iter().map(|run| run.wall(phase)).collect::<Vec<_>>());
+        let ratios = (0..REPEATS).map(|k| format!("{:.2}", times[0][k] / times[1][k]));
+        println!(
+            "| {phase} | {:.3} | {:.3} | {:.2} | {} |",
+            median(times[0].clone()),
+            median(times[1].clone()),
+            median(times[0].clone()) / median(times[1].clone()),
+            ratios.collect::<Vec<_>>().join(", ")
+        );
+    }
+    let linear = [0, 1].map(|k| runs[k][0].number("/linear_iterations/total"));
+    let memory = [0, 1].map(|k| runs[k][0].number("/peak_memory_bytes/max") / 1e6);
+    println!(
+        "{} points; linear iterations {} and {}; memory of the largest rank {:.0} and {:.0} MB; \
+         load {}",
+        runs[0][0].number("/points"),
+        linear[0],
+        linear[1],
+        memory[0],
+        memory[1],
+        load()
+    );
+}
+
+/// Peak memory over the size: the slope between runs that differ in points alone, and in grid
+/// and points together.
+fn memory() {
+    println!("\nmemory, 1 rank");
+    println!("| case | bytes per point | bytes per active node |");
+    println!("|---|---|---|");
+    let bytes = |sets: &[String]| {
+        let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
+        let run = run(1, &input("scaling.toml"), &sets);
+        (run.number("/points"), run.number("/peak_memory_bytes/max"))
+    };
+    let plane = |n: usize, per: usize| {
+        vec![
+            format!("grid.h={}", 1.0 / n as f64),
+            format!("body.0.points_per_cell=[{per},{per}]"),
+            "analysis.steps=1".into(),
+        ]
+    };
+    // b = b0 + points p + nodes q: three runs on two grids.
+    let fit = |name: &str, few: (f64, f64), many: (f64, f64), fine: (f64, f64), nodes: [f64; 2]| {
+        let p = (many.1 - few.1) / (many.0 - few.0);
+        let q = (fine.1 - few.1 - p * (fine.0 - few.0)) / (nodes[1] - nodes[0]);
+        println!("| {name} | {p:.0} | {q:.0} |");
+    };
+    let cells = |n: usize| (4 * n + 2) as f64 * (8 * n + 2) as f64;
+    fit(
+        "2D gimp",
+        bytes(&plane(24, 2)),
+        bytes(&plane(24, 4)),
+        bytes(&plane(48, 2)),
+        [cells(24), cells(48)],
+    );
+    let solid = |n: usize, per: usize| {
+        let mut sets = block_3d(n);
+        sets.push(format!("body.0.points_per_cell=[{per},{per},{per}]"));
+        sets
+    };
+    let nodes = |n: usize| ((n + 2) as f64).powi(3);
+    fit(
+        "3D gimp",
+        bytes(&solid(14, 2)),
+        bytes(&solid(14, 3)),
+        bytes(&solid(22, 2)),
+        [nodes(14), nodes(22)],
+    );
+}
