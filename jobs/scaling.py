@@ -151,7 +151,7 @@ def write_table(path, rows):
 class Plot:
     """A plot of lines over rank counts or sizes on logarithmic axes, or of stacked shares."""
 
-    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 360, 260, 64, 16, 30, 44
+    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 420, 260, 64, 84, 30, 44
     COLOURS = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#17becf"]
 
     def __init__(self, title, ranks, axis="ranks"):
@@ -216,12 +216,12 @@ class Plot:
         body += self.parts
         for ranks in self.ranks:
             body.append(f'<text x="{self.x(ranks):.1f}" y="{self.HEIGHT - self.BOTTOM + 16}" '
-                        f'text-anchor="middle">{ranks:.4g}</text>')
+                        f'text-anchor="middle">{ranks:.3g}</text>')
         body.append(f'<text x="{self.WIDTH / 2}" y="{self.HEIGHT - 12}" '
                     f'text-anchor="middle">{self.axis}</text>')
         for k, (name, colour) in enumerate(self.legend):
             y = self.TOP + 10 + 13 * k
-            body.append(f'<text x="{self.WIDTH - self.RIGHT - 4}" y="{y}" text-anchor="end" '
+            body.append(f'<text x="{self.WIDTH - self.RIGHT + 10}" y="{y}" '
                         f'fill="{colour}">{name}</text>')
         return "\n".join(body + ["</g>"])
 
@@ -287,6 +287,12 @@ def report(kind, rows):
         spread = f"{min(counts):.1f} to {max(counts):.1f}" if counts else "none"
         print(f"{kind}, {'with' if ghost else 'without'} Ghost: {spread} linear iterations per "
               f"solve over {len(mine)} rows" + (f", {failed} failed" if failed else ""))
+        if ghost and kind == "sizes" and len(mine) >= 3:
+            share = lambda name: exponent([(row["points"] / row["ranks"], row[name])
+                                           for row in mine])
+            print(f"sizes: bytes of the busiest rank and step grow as (points per rank)^"
+                  f"{share('bytes_max'):.2f}, the program's own ^{share('own_bytes_max'):.2f}; "
+                  f"a surface is ^0.5 in the plane")
         many = [row for row in mine if row["ranks"] >= 4]
         if ghost and kind == "strong" and len(many) >= 3:
             share = lambda name: exponent([(row["points"] / row["ranks"], row[name])
@@ -295,6 +301,45 @@ def report(kind, rows):
                   f"(points per rank)^{share('bytes_max'):.2f}, of the average rank "
                   f"^{share('bytes_mean'):.2f}; the program's own ^{share('own_bytes_max'):.2f}; "
                   f"a surface is ^0.5 in the plane")
+
+
+# Assumed of a large machine: s per message, bytes per s and rank, s per reduction and doubling.
+LATENCY, BANDWIDTH, REDUCTION = 2e-6, 1e9, 2e-6
+# Processor seconds per point and step of this deck on one rank (docs/scaling.md).
+PER_POINT = 7e-6
+
+
+def model(weak, sizes):
+    """What the counts say of rank counts that nobody has here."""
+    rows = [row for row in weak if row["ghost"] and row["ranks"] >= 4 and "linear" in row]
+    seen = rows[-1]
+
+    def grown(name, ranks):
+        """At the weak series' points per rank: linear in log2 of the ranks."""
+        pairs = [(math.log2(row["ranks"]), row[name]) for row in rows]
+        mx, my = (sum(p[k] for p in pairs) / len(pairs) for k in (0, 1))
+        slope = (sum((x - mx) * (y - my) for x, y in pairs)
+                 / sum((x - mx) ** 2 for x, _ in pairs))
+        return my + slope * (math.log2(ranks) - mx)
+
+    def power(name):
+        return exponent([(row["points"], row[name]) for row in sizes
+                         if row["ghost"] and "linear" in row])
+
+    print("| ranks | points per rank | messages | MB | reductions | work s | messages s | "
+          "bytes s | reductions s | efficiency |\n" + "|---" * 10 + "|")
+    for ranks in (64, 1000, 10_000, 100_000):
+        for points in (20_000, 50_000, 200_000):
+            larger = points / (seen["points"] / seen["ranks"])
+            messages = grown("messages_max", ranks) * larger ** power("messages_max")
+            size = grown("bytes_max", ranks) * larger ** power("bytes_max")
+            reductions = grown("reductions", ranks) * larger ** power("reductions")
+            work = PER_POINT * points
+            parts = (messages * LATENCY, size / BANDWIDTH,
+                     reductions * REDUCTION * math.log2(ranks))
+            print(f"| {ranks} | {points} | {messages:.0f} | {size / 1e6:.1f} | {reductions:.0f} | "
+                  f"{work:.2f} | {parts[0]:.3f} | {parts[1]:.3f} | {parts[2]:.3f} | "
+                  f"{100 * work / (work + sum(parts)):.0f} % |")
 
 
 def main():
@@ -340,10 +385,11 @@ def main():
     sizes = [(min(limit, 2), WIDTH / cells) for cells in (80, 160, 320, 480, 800)]
     plans = {"strong": [(n, words.h) for n in ranks], "weak": [(n, weak_h[n]) for n in ranks],
              "sizes": sizes}
+    tables = {}
     for kind, plan in plans.items():
         if words.kind not in (kind, "all"):
             continue
-        rows = []
+        rows = tables[kind] = []
         for ghost in (True, False):
             for n, h in plan:
                 if not ghost and not (n in bare or (kind == "sizes" and words.bare != [])):
@@ -359,6 +405,8 @@ def main():
                 write_table(os.path.join(out, f"scaling-{kind}.csv"), rows)
         write_plots(os.path.join(out, f"scaling-{kind}.svg"), kind, rows)
         report(kind, rows)
+    if everything and sum(row["ranks"] >= 4 for row in tables["weak"]) > 2:
+        model(tables["weak"], tables["sizes"])
 
 
 if __name__ == "__main__":

@@ -243,7 +243,7 @@ fn kill_at_random(times: u32, ranks: usize) {
     let folder = tempfile::tempdir().unwrap();
     let deck = deck("restart");
     // Nearly all the time goes into writing.
-    let busy = ["--set", "analysis.steps=150", "--set", "output.checkpoint={every=1,keep=2}"];
+    let busy = ["--set", "analysis.steps=60", "--set", "output.checkpoint={every=1,keep=2}"];
     let whole = folder.path().join("whole");
     run_well(ranks, &deck, &whole, &busy);
     let out = folder.path().join("out");
@@ -278,7 +278,7 @@ fn kill_at_random(times: u32, ranks: usize) {
     let last = if newest(&out).is_some() { ["--restart", "last"] } else { ["--force", "--force"] };
     let last = if last[0] == "--force" { &last[..1] } else { &last[..] };
     run_well(ranks, &deck, &out, &[&busy[..], last].concat());
-    let ends = [&whole, &out].map(|out| points_of(&out.join("checkpoint-000150.h5")));
+    let ends = [&whole, &out].map(|out| points_of(&out.join("checkpoint-000060.h5")));
     let (error, field) = difference(&ends[0], &ends[1]);
     assert_eq!(error, 0.0, "{field} differs");
     assert_eq!(history(&whole), history(&out));
