@@ -21,11 +21,8 @@ fn main() {
         beam();
     }
     if wanted("pairs") {
-        pairs("2D gimp, 204 800 points", &["grid.h=0.025"]);
-        pairs(
-            "3D gimp, 216 000 points",
-            &block_3d(30).iter().map(String::as_str).collect::<Vec<_>>(),
-        );
+        pairs("2D gimp, 8 steps", &["grid.h=0.02", "analysis.steps=8"]);
+        pairs("3D gimp, 2 steps", &block_3d(30).iter().map(String::as_str).collect::<Vec<_>>());
     }
     if wanted("memory") {
         memory();
@@ -113,7 +110,7 @@ fn block_3d(cells: usize) -> Vec<String> {
         "boundary.0.where={side=\"back\"}".into(),
         "boundary.0.fix=[\"z\",\"y\"]".into(),
         "load.0.gravity=[0,0,-10]".into(),
-        "analysis.steps=1".into(),
+        "analysis.steps=2".into(),
     ]
     .into()
 }
@@ -158,45 +155,32 @@ fn pairs(name: &str, sets: &[&str]) {
 /// and points together.
 fn memory() {
     println!("\nmemory, 1 rank");
-    println!("| case | bytes per point | bytes per active node |");
+    println!("| case | bytes per point | bytes per populated cell (about one node) |");
     println!("|---|---|---|");
-    let bytes = |sets: &[String]| {
+    let sizes = |sets: &[String]| {
         let sets: Vec<&str> = sets.iter().map(String::as_str).collect();
         let run = run(1, &input("scaling.toml"), &sets);
-        (run.number("/points"), run.number("/peak_memory_bytes/max"))
+        let at = |path: &str| run.number(path);
+        [at("/points"), at("/cells_populated"), at("/peak_memory_bytes/max")]
+    };
+    // bytes = constant + p points + q cells: more points in the same cells, then more cells.
+    let fit = |name: &str, few: [f64; 3], many: [f64; 3], fine: [f64; 3]| {
+        let p = (many[2] - few[2]) / (many[0] - few[0]);
+        let q = (fine[2] - few[2] - p * (fine[0] - few[0])) / (fine[1] - few[1]);
+        println!("| {name} | {p:.0} | {q:.0} |");
     };
     let plane = |n: usize, per: usize| {
         vec![
             format!("grid.h={}", 1.0 / n as f64),
             format!("body.0.points_per_cell=[{per},{per}]"),
-            "analysis.steps=1".into(),
+            "analysis.steps=2".into(),
         ]
     };
-    // b = b0 + points p + nodes q: three runs on two grids.
-    let fit = |name: &str, few: (f64, f64), many: (f64, f64), fine: (f64, f64), nodes: [f64; 2]| {
-        let p = (many.1 - few.1) / (many.0 - few.0);
-        let q = (fine.1 - few.1 - p * (fine.0 - few.0)) / (nodes[1] - nodes[0]);
-        println!("| {name} | {p:.0} | {q:.0} |");
-    };
-    let cells = |n: usize| (4 * n + 2) as f64 * (8 * n + 2) as f64;
-    fit(
-        "2D gimp",
-        bytes(&plane(24, 2)),
-        bytes(&plane(24, 4)),
-        bytes(&plane(48, 2)),
-        [cells(24), cells(48)],
-    );
+    fit("2D gimp", sizes(&plane(24, 2)), sizes(&plane(24, 4)), sizes(&plane(48, 2)));
     let solid = |n: usize, per: usize| {
         let mut sets = block_3d(n);
         sets.push(format!("body.0.points_per_cell=[{per},{per},{per}]"));
         sets
     };
-    let nodes = |n: usize| ((n + 2) as f64).powi(3);
-    fit(
-        "3D gimp",
-        bytes(&solid(14, 2)),
-        bytes(&solid(14, 3)),
-        bytes(&solid(22, 2)),
-        [nodes(14), nodes(22)],
-    );
+    fit("3D gimp", sizes(&solid(14, 2)), sizes(&solid(14, 3)), sizes(&solid(22, 2)));
 }
