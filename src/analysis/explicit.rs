@@ -93,6 +93,7 @@ pub fn run<const D: usize>(
         }
         steps.accept(span);
         recorder.steps_completed = number;
+        recorder.linear.add(row.linear_iterations);
         if steps.follows_limit() {
             limit = limit_now(model, points).0;
         }

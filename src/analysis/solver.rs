@@ -55,11 +55,16 @@ impl Linear {
         if one { Linear::DirectOnOne } else { Linear::Direct }
     }
 
+    /// One of several ranks solves for all.
+    fn gathers(self, ranks: usize) -> bool {
+        self == Linear::DirectOnOne && ranks > 1
+    }
+
     /// Options without the prefix, on `ranks` ranks.
     pub fn options(self, ranks: usize) -> Vec<(&'static str, String)> {
         const PACKAGE: &str = "mumps";
         let list: &[(&str, &str)] = match self {
-            Linear::DirectOnOne if ranks > 1 => &[
+            Linear::DirectOnOne if self.gathers(ranks) => &[
                 ("ksp_type", "preonly"),
                 ("pc_type", "telescope"),
                 ("telescope_ksp_type", "preonly"),
@@ -89,18 +94,20 @@ impl Linear {
         };
         let mut options: Vec<_> =
             list.iter().map(|(name, value)| (*name, (*value).to_string())).collect();
-        if self == Linear::DirectOnOne && ranks > 1 {
+        if self.gathers(ranks) {
             options.push(("pc_telescope_reduction_factor", ranks.to_string()));
         }
         options
     }
 }
 
-/// Newton's method with a built-in linear solver for `equations` unknowns.
+/// Newton's method with a built-in linear solver for `equations` unknowns. `null_pivots`: the
+/// system may be singular and consistent, and a direct solver has to look for zero pivots.
 pub fn newton(
     world: &World,
     linear: Linear,
     equations: usize,
+    null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
@@ -108,6 +115,10 @@ pub fn newton(
     // Sequential matrices do not know these words.
     if world.size() > 1 {
         options::set_default("matptap_via", coarse_product(equations))?;
+    }
+    if null_pivots && linear != Linear::Multigrid {
+        let inner = if linear.gathers(world.size()) { "telescope_" } else { "" };
+        snes.set_defaults(&[(&format!("{inner}mat_mumps_icntl_24"), "1")])?;
     }
     snes.set_from_options()?;
     Ok(snes)

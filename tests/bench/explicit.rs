@@ -8,7 +8,6 @@
 //! over the difference of the steps is what a step costs, free of set-up and output.
 
 mod limits;
-#[allow(dead_code, reason = "the other benches time parts and memory")]
 mod report;
 
 use std::path::Path;
