@@ -145,6 +145,8 @@ impl Run {
             job.env(name, "1");
         }
         job.env("OMPI_MCA_rmaps_base_oversubscribe", "1")
+            // After a run that failed mpirun waits so long for ranks that are gone already, s.
+            .env("OMPI_MCA_odls_base_sigkill_timeout", "0")
             .env("OMPI_MCA_hwloc_base_binding_policy", "none")
             .env("OMPI_MCA_mpi_yield_when_idle", "1")
             .env("OMP_NUM_THREADS", "1")
