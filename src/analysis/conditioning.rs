@@ -17,7 +17,7 @@ use crate::points::Points;
 use super::balance::{self, imbalance};
 use super::checkpointing::Moment;
 use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
+use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::{add_scalar, ghost_matrix};
 use super::extremes::{self, Extremes};
 use super::mapping;
@@ -86,17 +86,7 @@ fn study<const D: usize>(
 ) -> Result<HistoryRow> {
     let deck = &model.deck;
     let (mesh, conditions) = clock.time(Phase::Locate, || {
-        let mesh = Discretisation::new(world, model, points)?;
-        let conditions = Conditions::evaluate(
-            world,
-            &model.grid,
-            deck.method.basis,
-            &mesh.numbering,
-            points,
-            &deck.boundaries,
-            span,
-        )?;
-        Ok((mesh, conditions))
+        Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
     })?;
     let system = clock.time(Phase::Assemble, || System::assemble(world, model, &mesh, points))?;
     let free: Vec<bool> =

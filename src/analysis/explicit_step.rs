@@ -47,17 +47,7 @@ pub(super) fn advance<const D: usize>(
             Mass::Consistent => Coupling::Mass,
             Mass::Lumped => Coupling::Diagonal,
         };
-        let mesh = Discretisation::with_coupling(world, model, points, coupling)?;
-        let conditions = Conditions::evaluate(
-            world,
-            grid,
-            deck.method.basis,
-            &mesh.numbering,
-            points,
-            &deck.boundaries,
-            span,
-        )?;
-        Ok((mesh, conditions))
+        Discretisation::with_conditions(world, model, points, coupling, span)
     })?;
     let numbering = &mesh.numbering;
     let nodes = numbering.len();

@@ -6,7 +6,7 @@
 //! Velocity and acceleration come from the points by Ghost eq. 10 and return as increments
 //! (velocity, by the deck's FLIP share) and values (acceleration).
 
-use crate::assembly::conditions::{Conditions, StepSpan};
+use crate::assembly::conditions::StepSpan;
 use crate::assembly::external::point_forces;
 use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ use crate::points::Points;
 use super::balance::{self, imbalance};
 use super::checkpointing::Moment;
 use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
+use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::{Equilibrium, Inertia};
 use super::grid_mass::GridMass;
 use super::ledger::{Entry, Ledger, StepSums};
@@ -234,17 +234,7 @@ fn solve_step<const D: usize>(
         dt: span.time_end - span.time_start,
     };
     let (mesh, conditions) = clock.time(Phase::Locate, || {
-        let mesh = Discretisation::new(world, model, points)?;
-        let conditions = Conditions::evaluate(
-            world,
-            &model.grid,
-            deck.method.basis,
-            &mesh.numbering,
-            points,
-            &deck.boundaries,
-            span,
-        )?;
-        Ok((mesh, conditions))
+        Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
     })?;
     let numbering = &mesh.numbering;
     let (nodes, owned) = (numbering.len(), numbering.owned * D);
