@@ -14,7 +14,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::{self, imbalance};
+use super::balance::{self};
 use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
@@ -105,11 +105,8 @@ fn study<const D: usize>(
             &none,
             &none,
         ),
-        ghost_faces: world.sum_usize(mesh.faces.len()),
-        populated_cells: world.sum_usize(mesh.populated.owned.len()),
-        imbalance: imbalance(world, points.len()),
         conditioning: numbers,
-        ..HistoryRow::default()
+        ..mesh.row(world, points)
     })
 }
 

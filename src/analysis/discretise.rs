@@ -4,7 +4,7 @@ use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::internal::StepPoints;
 use crate::assembly::manufactured::Manufactured;
 use crate::assembly::numbering::Touched;
-use crate::assembly::{Numbering, Pattern, Populated, pattern};
+use crate::assembly::{Numbering, Pattern, Populated, external, pattern};
 use crate::basis::{self, Groups, Influences};
 use crate::deck::Deck;
 use crate::deck::model::Basis;
@@ -13,10 +13,11 @@ use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
 use crate::grid::Grid;
 use crate::material::Material;
+use crate::output::history::HistoryRow;
 use crate::parallel::{Partition, World};
 use crate::points::Points;
 
-use super::balance::Balance;
+use super::balance::{Balance, imbalance};
 
 /// What stays the same while points move: the deck made computable.
 pub struct Model<const D: usize> {
@@ -30,6 +31,27 @@ pub struct Model<const D: usize> {
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
     pub balance: Balance,
+}
+
+impl<const D: usize> Model<D> {
+    /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.
+    pub fn point_forces(
+        &self,
+        world: &World,
+        points: &Points<D>,
+        load_factor: f64,
+        time: f64,
+    ) -> Result<Vec<[f64; D]>> {
+        world.fail_together(external::point_forces(
+            points,
+            &self.materials,
+            &self.deck.loads,
+            self.manufactured.as_ref(),
+            self.deck.analysis.kind,
+            load_factor,
+            time,
+        ))
+    }
 }
 
 /// Everything a step needs that depends on where the points are at its start.
@@ -90,6 +112,16 @@ impl<const D: usize> Discretisation<D> {
             span,
         )?;
         Ok((mesh, conditions))
+    }
+
+    /// What a history row says of the grid side, the rest of the row at its defaults. Collective.
+    pub fn row(&self, world: &World, points: &Points<D>) -> HistoryRow {
+        HistoryRow {
+            ghost_faces: world.sum_usize(self.faces.len()),
+            populated_cells: world.sum_usize(self.populated.owned.len()),
+            imbalance: imbalance(world, points.len()),
+            ..HistoryRow::default()
+        }
     }
 
     /// As [`Self::new`]. Collective.

@@ -5,16 +5,14 @@
 use std::time::Instant;
 
 use crate::assembly::conditions::{Conditions, StepSpan};
-use crate::assembly::external::point_forces;
 use crate::assembly::internal::StepPoints;
-use crate::deck::model::{AnalysisType, Mass, StressUpdate};
+use crate::deck::model::{Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::imbalance;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
@@ -54,7 +52,12 @@ pub(super) fn advance<const D: usize>(
     // Held components move with their boundary's mean velocity over the step.
     let held_velocity: Vec<f64> = conditions.increment.iter().map(|u| u / dt).collect();
     let at_rest = vec![0.0; nodes * D];
-    let external = world.fail_together(external_forces(model, points, span))?;
+    // Empty without loads.
+    let external = if deck.loads.is_empty() {
+        Vec::new()
+    } else {
+        model.point_forces(world, points, span.factor_start, span.time_start)?
+    };
 
     let mass = clock.time(Phase::Assemble, || {
         let step = mesh.step_points(points, &model.materials);
@@ -233,10 +236,7 @@ pub(super) fn advance<const D: usize>(
             &residual,
             &vec![0.0; residual.len()],
         ),
-        ghost_faces: world.sum_usize(mesh.faces.len()),
-        populated_cells: world.sum_usize(mesh.populated.owned.len()),
-        imbalance: imbalance(world, points.len()),
-        ..HistoryRow::default()
+        ..mesh.row(world, points)
     };
     let sums = StepSums { energies, ghost, work };
     Ok((Solved { row, mesh, displacement, reaction }, sums))
@@ -248,26 +248,6 @@ fn blend<const D: usize>(share: f64, a: &[[f64; D]], b: &[[f64; D]]) -> Vec<[f64
         .zip(b)
         .map(|(a, b)| std::array::from_fn(|i| share * a[i] + (1.0 - share) * b[i]))
         .collect()
-}
-
-/// Force on each point, empty where there is no load.
-fn external_forces<const D: usize>(
-    model: &Model<D>,
-    points: &Points<D>,
-    span: StepSpan,
-) -> Result<Vec<[f64; D]>> {
-    if model.deck.loads.is_empty() {
-        return Ok(Vec::new());
-    }
-    point_forces(
-        points,
-        &model.materials,
-        &model.deck.loads,
-        model.manufactured.as_ref(),
-        AnalysisType::Explicit,
-        span.factor_start,
-        span.time_start,
-    )
 }
 
 /// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the

@@ -7,8 +7,6 @@
 //! (velocity, by the deck's FLIP share) and values (acceleration).
 
 use crate::assembly::conditions::StepSpan;
-use crate::assembly::external::point_forces;
-use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::RunState;
@@ -17,7 +15,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::{self, imbalance};
+use super::balance::{self};
 use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
@@ -239,18 +237,7 @@ fn solve_step<const D: usize>(
     let numbering = &mesh.numbering;
     let (nodes, owned) = (numbering.len(), numbering.owned * D);
     let step = mesh.step_points(points, &model.materials);
-    let forces_at = |factor: f64, time: f64| {
-        let forces = point_forces(
-            points,
-            &model.materials,
-            &deck.loads,
-            model.manufactured.as_ref(),
-            AnalysisType::ImplicitDynamic,
-            factor,
-            time,
-        );
-        world.fail_together(forces)
-    };
+    let forces_at = |factor, time| model.point_forces(world, points, factor, time);
     let point_forces_start = forces_at(span.factor_start, span.time_start)?;
     let external_start = owned_forces(world, numbering, &mesh, &point_forces_start)?;
     let forces_end = forces_at(span.factor_end, span.time_end)?;
@@ -382,10 +369,7 @@ fn solve_step<const D: usize>(
             &supplied,
             &vec![0.0; owned],
         ),
-        ghost_faces: world.sum_usize(mesh.faces.len()),
-        populated_cells: world.sum_usize(mesh.populated.owned.len()),
-        imbalance: imbalance(world, points.len()),
-        ..HistoryRow::default()
+        ..mesh.row(world, points)
     };
     let ghost_work = solved.ghost_energy;
     Ok(Ok(Solved { row, sums, ghost_work, mesh, displacement, reaction, moved_grid }))

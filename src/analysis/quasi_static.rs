@@ -3,9 +3,8 @@
 
 use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
-use crate::assembly::external::{map_forces, point_forces};
+use crate::assembly::external::map_forces;
 use crate::deck::Deck;
-use crate::deck::model::AnalysisType;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::RunState;
@@ -15,7 +14,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::{self, imbalance};
+use super::balance::{self};
 use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
@@ -174,16 +173,7 @@ fn solve_step<const D: usize>(
     })?;
     let numbering = &mesh.numbering;
     let external = |factor: f64, time: f64| -> Result<Vec<f64>> {
-        let forces = point_forces(
-            points,
-            &model.materials,
-            &deck.loads,
-            model.manufactured.as_ref(),
-            AnalysisType::QuasiStatic,
-            factor,
-            time,
-        );
-        let forces = world.fail_together(forces)?;
+        let forces = model.point_forces(world, points, factor, time)?;
         owned_forces(world, numbering, &mesh, &forces)
     };
     let external_start = external(span.factor_start, span.time_start)?;
@@ -275,10 +265,7 @@ fn solve_step<const D: usize>(
             &internal,
             &external_end,
         ),
-        ghost_faces: world.sum_usize(mesh.faces.len()),
-        populated_cells: world.sum_usize(mesh.populated.owned.len()),
-        imbalance: imbalance(world, points.len()),
-        ..HistoryRow::default()
+        ..mesh.row(world, points)
     };
     Ok(Ok(Solved { row, mesh, displacement, reaction, moved_grid }))
 }
