@@ -81,6 +81,15 @@ impl Run {
         Run { deck: Deck::Text(text.into()), ..Self::file("") }
     }
 
+    /// The same with a deck changed by `change`. Panics for a deck that is a file.
+    pub fn replaced(mut self, change: impl FnOnce(&str) -> String) -> Self {
+        match &self.deck {
+            Deck::Text(text) => self.deck = Deck::Text(change(text)),
+            Deck::File(path) => panic!("{} is a file", path.display()),
+        }
+        self
+    }
+
     pub fn ranks(mut self, ranks: usize) -> Self {
         self.ranks = ranks;
         self
