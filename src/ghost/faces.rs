@@ -3,11 +3,12 @@
 //! (Ghost §3.1, §4.2). Found for each body alone, then united.
 //!
 //! The penalty bounds the condition only if a path of such faces leads from every cell to a well
-//! filled one (Burman 2010). Points leave triangles and tetrahedra empty between populated ones
+//! filled one (E. Burman, "Ghost penalty", Comptes Rendus Mathematique 348 (2010) 1217-1220). Points leave triangles and tetrahedra empty between populated ones
 //! far more often than the paper's quadrilaterals, and a cell behind such a gap would hang on by
 //! nodes alone. So an empty simplex between two populated cells is a *bridge*: its faces to them
 //! are boundary faces, too. Two faces hold all nodes of a simplex, so this adds no equation, and a
-//! linear field still has no jump. Quadrilaterals and hexahedra stay with the paper's rule.
+//! linear field still has no jump. Where two or more empty simplices lie between them the cells
+//! are tied directly ([`super::ties`]). Quadrilaterals and hexahedra stay with the paper's rule.
 
 use rustc_hash::FxHashMap;
 
@@ -15,7 +16,9 @@ use crate::error::Result;
 use crate::grid::{FacePair, Grid};
 use crate::parallel::{Partition, World, exchange};
 
-/// A face with its bodies, one bit each.
+use super::ties::ties;
+
+/// A face, or a tie of two simplices as if they shared one, with its bodies, one bit each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BoundaryFace {
     pub pair: FacePair,
@@ -24,17 +27,24 @@ pub struct BoundaryFace {
 
 /// What a neighbour rank must know of a cell.
 #[derive(Debug, Clone, Copy, Default)]
-struct Cell {
+pub(super) struct Cell {
     /// Bodies that populate the cell, one bit each.
-    populated: u64,
+    pub populated: u64,
     /// Bodies for which it is a boundary cell.
-    boundary: u64,
+    pub boundary: u64,
     /// Bodies for which it is an empty simplex between two populated ones.
-    bridge: u64,
+    pub bridge: u64,
+}
+
+impl Cell {
+    /// What another rank is told of the cell.
+    pub fn record(self, cell: u64) -> [u64; 4] {
+        [cell, self.populated, self.boundary, self.bridge]
+    }
 }
 
 /// The cells of this rank, in their order, and those of others that are known.
-struct Cells {
+pub(super) struct Cells {
     first: usize,
     /// Place in `own` of the cells from `first` on; empty where they lie far apart.
     table: Vec<u32>,
@@ -63,7 +73,7 @@ impl Cells {
     }
 
     #[inline]
-    fn get(&self, cell: usize) -> Option<&Cell> {
+    pub fn get(&self, cell: usize) -> Option<&Cell> {
         self.place(cell).map(|at| &self.own[at]).or_else(|| self.others.get(&cell))
     }
 
@@ -71,6 +81,14 @@ impl Cells {
         match self.place(cell) {
             Some(at) => &mut self.own[at],
             None => self.others.entry(cell).or_default(),
+        }
+    }
+
+    /// Takes in the [`Cell::record`]s of cells of other ranks.
+    pub fn learn(&mut self, records: &[u64]) {
+        for record in records.chunks_exact(4) {
+            let state = Cell { populated: record[1], boundary: record[2], bridge: record[3] };
+            self.others.insert(record[0] as usize, state);
         }
     }
 
@@ -85,7 +103,7 @@ impl Cells {
     }
 }
 
-/// Finds the boundary faces whose lower cell this rank owns, in ascending order.
+/// Finds the boundary faces and ties whose lower cell this rank owns, in ascending order.
 ///
 /// `populated` lists the populated cells this rank owns, each with the bits of its bodies, in
 /// ascending order. Cells across a partition border are exchanged twice: once to know which
@@ -138,6 +156,16 @@ pub fn boundary_faces<const D: usize>(
                 });
             }
         }
+    }
+    if grid.element().is_simplex() {
+        let boundary: Vec<(usize, u64)> = populated
+            .iter()
+            .zip(&cells.own)
+            .filter(|(_, state)| state.boundary != 0)
+            .map(|(&(cell, _), state)| (cell, state.boundary))
+            .collect();
+        faces.extend(ties(world, grid, partition, &mut cells, &boundary)?);
+        faces.sort_unstable_by_key(|face| (face.pair.lower, face.pair.upper));
     }
     Ok(faces)
 }
@@ -200,19 +228,11 @@ fn share_border_cells<const D: usize>(
         ranks.dedup();
         let state = cells.get(cell).copied().unwrap_or_default();
         for &rank in ranks.iter().filter(|&&rank| rank != here) {
-            outgoing.entry(rank).or_default().extend([
-                cell as u64,
-                state.populated,
-                state.boundary,
-                state.bridge,
-            ]);
+            outgoing.entry(rank).or_default().extend(state.record(cell as u64));
         }
     }
     for (_, words) in exchange(world, outgoing.into_iter().collect())? {
-        for record in words.chunks_exact(4) {
-            let state = Cell { populated: record[1], boundary: record[2], bridge: record[3] };
-            cells.others.insert(record[0] as usize, state);
-        }
+        cells.learn(&words);
     }
     Ok(())
 }

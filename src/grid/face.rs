@@ -16,7 +16,8 @@ pub struct FaceJump {
     /// Nodes of both cells, ascending, shared ones once.
     pub nodes: Vec<usize>,
     /// Quadrature points: weight (m^(D-1), it sums to the face's measure) and, per entry of
-    /// `nodes`, dN/dn in the upper cell minus dN/dn in the lower one, 1/m.
+    /// `nodes`, dN/dn in the upper cell minus dN/dn in the lower one, 1/m. Between simplices that
+    /// share no face: one per axis, with the whole measure and the jump of dN along the axis.
     pub points: Vec<(f64, Vec<f64>)>,
     /// h of Ghost eq. 16, m: the face's length (2D) or the square root of its area (3D).
     pub size: f64,
@@ -29,9 +30,10 @@ const GAUSS_UNIT: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
 impl<const D: usize> Grid<D> {
     /// Geometry of an interior face. Quadrature with two points per axis of the face, which is
-    /// exact for products of jumps on lattices and simplices.
+    /// exact for products of jumps on lattices and simplices. Two simplices that share a node but
+    /// no face are treated as if they did: see [`node_jump`].
     ///
-    /// Error: the two cells share no face.
+    /// Error: the two cells share no face (two simplices: no node).
     pub fn face_jump(&self, pair: FacePair) -> Result<FaceJump> {
         match self {
             Grid::Lattice(lattice) => lattice_jump(lattice, pair),
@@ -95,11 +97,15 @@ fn lattice_jump<const D: usize>(lattice: &Lattice<D>, pair: FacePair) -> Result<
 /// On a mesh both cells' gradients are taken at the same places of the face; a face point has
 /// its reference coordinates in either cell by interpolation between the face's nodes.
 fn mesh_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump> {
-    let inside = pair.lower < mesh.cell_count() && pair.upper < mesh.cell_count();
-    let face = inside
-        .then(|| mesh.across(pair.lower).position(|other| other == Some(pair.upper)))
-        .flatten()
-        .ok_or_else(|| no_common_face(pair))?;
+    if pair.lower >= mesh.cell_count() || pair.upper >= mesh.cell_count() {
+        return Err(no_common_face(pair));
+    }
+    let face = mesh.across(pair.lower).position(|other| other == Some(pair.upper));
+    let face = match face {
+        Some(face) => face,
+        None if mesh.element.is_simplex() => return node_jump(mesh, pair),
+        None => return Err(no_common_face(pair)),
+    };
     let element = mesh.element;
     let face = element.faces()[face];
     let cells = [pair.lower, pair.upper];
@@ -163,6 +169,44 @@ fn mesh_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump>
         points,
         size: if D == 3 { area.sqrt() } else { area },
         cell_size: 0.5 * (extent[0] + extent[1]),
+    })
+}
+
+/// The jump of the whole gradient between two linear simplices with a common node, one "quadrature
+/// point" an axis. With a common face only the normal part of it differs from zero, so its square
+/// is that of the normal jump. Measures are those of a right-angled simplex of their mean volume.
+fn node_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump> {
+    let cells = [pair.lower, pair.upper];
+    let nodes = cells.map(|cell| mesh.nodes_of(cell));
+    if nodes[0].iter().all(|node| !nodes[1].contains(node)) {
+        return Err(no_common_face(pair));
+    }
+    let mut union: Vec<u32> = nodes.concat();
+    union.sort_unstable();
+    union.dedup();
+    let mut jumps = vec![vec![0.0; union.len()]; D];
+    // Of a right-angled simplex with legs h: det J = h^D.
+    let mut determinant = 0.0;
+    for (side, sign) in [(0, -1.0), (1, 1.0)] {
+        let x = mesh.cell_positions(cells[side]);
+        let centre = mesh.element.reference_centre();
+        let (gradients, det) = element::gradients(mesh.element, &x[..=D], &centre)
+            .ok_or_else(|| Error::Run(format!("cell {} of the mesh is flat", cells[side])))?;
+        determinant += 0.5 * det;
+        for (&node, g) in nodes[side].iter().zip(&gradients) {
+            let slot = union.partition_point(|&n| n < node);
+            for (jump, g) in jumps.iter_mut().zip(g) {
+                jump[slot] += sign * g;
+            }
+        }
+    }
+    let leg = determinant.powf(1.0 / D as f64);
+    let area = if D == 3 { 0.5 * leg * leg } else { leg };
+    Ok(FaceJump {
+        nodes: union.iter().map(|&n| n as usize).collect(),
+        points: jumps.into_iter().map(|jump| (area, jump)).collect(),
+        size: if D == 3 { area.sqrt() } else { area },
+        cell_size: leg,
     })
 }
 

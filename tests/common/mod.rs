@@ -1,6 +1,7 @@
 //! Runs things under `mpirun` from ordinary tests, with a time limit and one job at a time.
 #![allow(dead_code)]
 
+pub mod left;
 pub mod run;
 pub mod validation;
 
@@ -11,9 +12,9 @@ use std::sync::Mutex;
 use mpi::environment::Universe;
 
 /// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
-const TIME_LIMIT: &str = "120";
+const TIME_LIMIT: u32 = 120;
 /// More ranks than cores, none bound, and waiting ranks give way; root is welcome.
-pub const OPEN_MPI: [(&str, &str); 6] = [
+const OPEN_MPI: [(&str, &str); 6] = [
     ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
     ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
     ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
@@ -28,14 +29,17 @@ static ONE_JOB: Mutex<()> = Mutex::new(());
 /// Runs `command` (program, then its arguments) on `n` ranks with extra environment variables.
 pub fn mpirun<S: AsRef<OsStr>>(n: usize, command: &[S], env: &[(&str, &str)]) -> Output {
     let _alone = ONE_JOB.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let mut job = Command::new("mpirun");
-    job.args(["-n", &n.to_string(), "--timeout", TIME_LIMIT]).args(command).stdin(Stdio::null());
-    for (name, value) in OPEN_MPI {
-        job.env(name, value);
-    }
-    job.env_remove("PETSC_OPTIONS");
-    job.envs(env.iter().copied());
+    let mut job = job(n, TIME_LIMIT);
+    job.args(command).envs(env.iter().copied());
     job.output().expect("mpirun is on the PATH")
+}
+
+/// `mpirun` on `n` ranks, killed after `seconds`; what it runs is yet to be said.
+pub fn job(n: usize, seconds: u32) -> Command {
+    let mut job = Command::new("mpirun");
+    job.args(["-n", &n.to_string(), "--timeout", &seconds.to_string()]);
+    job.envs(OPEN_MPI).env_remove("PETSC_OPTIONS").stdin(Stdio::null());
+    job
 }
 
 /// Body of a test on several rank counts. The ordinary test process starts its own executable

@@ -1,12 +1,15 @@
-//! Whole runs of the program in temporary folders, and what they leave.
+//! Runs of the program that go on while a test watches, kills or continues them; `run.rs` is for
+//! those that come to their end.
 #![allow(dead_code)]
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::process::{Child, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::{OPEN_MPI, mpirun};
+#[allow(unused_imports)]
+pub use crate::common::left::{column, history, summary};
+use crate::common::{job, mpirun};
 
 pub const PROGRAM: &str = env!("CARGO_BIN_EXE_mpm-par");
 
@@ -65,12 +68,8 @@ pub struct Running(pub Child);
 
 impl Running {
     pub fn start(n: usize, deck: &Path, out: &Path, more: &[&str]) -> Self {
-        let mut job = Command::new("mpirun");
-        job.args(["-n", &n.to_string(), "--timeout", "120"]).args(words(deck, out, more, n));
-        for (name, value) in OPEN_MPI {
-            job.env(name, value);
-        }
-        job.env_remove("PETSC_OPTIONS").stdin(Stdio::null());
+        let mut job = job(n, 120);
+        job.args(words(deck, out, more, n));
         job.stdout(Stdio::piped()).stderr(Stdio::piped());
         Running(job.spawn().expect("mpirun is on the PATH"))
     }
@@ -162,37 +161,6 @@ pub fn difference(a: &BTreeMap<String, Vec<f64>>, b: &BTreeMap<String, Vec<f64>>
         }
     }
     largest
-}
-
-/// A column of `history.csv` by the name before its unit.
-pub fn column(out: &Path, name: &str) -> Vec<f64> {
-    let mut table = csv::Reader::from_path(out.join("history.csv")).expect("history.csv");
-    let header = table.headers().expect("a header").clone();
-    let at = header.iter().position(|word| word.split(" [").next() == Some(name)).expect(name);
-    table.records().map(|row| row.expect("a whole row")[at].parse().expect("a number")).collect()
-}
-
-/// `history.csv` without the columns that tell of the machine.
-pub fn history(out: &Path) -> Vec<Vec<String>> {
-    let mut table = csv::Reader::from_path(out.join("history.csv")).expect("history.csv");
-    let header = table.headers().expect("a header").clone();
-    table
-        .records()
-        .map(|row| {
-            let row = row.expect("a whole row");
-            header
-                .iter()
-                .zip(&row)
-                .filter(|(name, _)| !name.starts_with("wall_seconds"))
-                .map(|(_, word)| word.to_string())
-                .collect()
-        })
-        .collect()
-}
-
-pub fn summary(out: &Path) -> serde_json::Value {
-    let text = std::fs::read_to_string(out.join("summary.json")).expect("summary.json");
-    serde_json::from_str(&text).expect("JSON")
 }
 
 /// Names and contents of a folder.

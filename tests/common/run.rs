@@ -2,13 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 use std::sync::{Condvar, Mutex};
 
 use tempfile::TempDir;
 
+use super::{job, left};
+
 /// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
-const TIME_LIMIT: &str = "900";
+const TIME_LIMIT: u32 = 900;
 /// Ranks that run at the same time, over all tests of this executable.
 const CORES: usize = 2;
 
@@ -81,6 +83,15 @@ impl Run {
         Run { deck: Deck::Text(text.into()), ..Self::file("") }
     }
 
+    /// The same with a deck changed by `change`. Panics for a deck that is a file.
+    pub fn replaced(mut self, change: impl FnOnce(&str) -> String) -> Self {
+        match &self.deck {
+            Deck::Text(text) => self.deck = Deck::Text(change(text)),
+            Deck::File(path) => panic!("{} is a file", path.display()),
+        }
+        self
+    }
+
     pub fn ranks(mut self, ranks: usize) -> Self {
         self.ranks = ranks;
         self
@@ -135,22 +146,10 @@ impl Run {
 
     fn start(&self, folder: &Path, arguments: &[String]) -> Output {
         let _cores = Cores::take(self.ranks);
-        let ranks = self.ranks.to_string();
-        let mut job = Command::new("mpirun");
-        job.args(["-n", &ranks, "--timeout", TIME_LIMIT, env!("CARGO_BIN_EXE_mpm-par")])
-            .args(arguments)
-            .current_dir(folder)
-            .stdin(Stdio::null());
-        for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM"] {
-            job.env(name, "1");
-        }
-        job.env("OMPI_MCA_rmaps_base_oversubscribe", "1")
-            // After a run that failed mpirun waits so long for ranks that are gone already, s.
-            .env("OMPI_MCA_odls_base_sigkill_timeout", "0")
-            .env("OMPI_MCA_hwloc_base_binding_policy", "none")
-            .env("OMPI_MCA_mpi_yield_when_idle", "1")
-            .env("OMP_NUM_THREADS", "1")
-            .env_remove("PETSC_OPTIONS");
+        let mut job = job(self.ranks, TIME_LIMIT);
+        job.arg(env!("CARGO_BIN_EXE_mpm-par")).args(arguments).current_dir(folder);
+        // After a run that failed mpirun waits so long for ranks that are gone already, s.
+        job.env("OMPI_MCA_odls_base_sigkill_timeout", "0");
         job.envs(self.env.iter().map(|(name, value)| (name, value)));
         job.output().expect("mpirun is on the PATH")
     }
@@ -201,8 +200,7 @@ pub struct Results {
 impl Results {
     fn read(folder: TempDir, name: &str) -> Self {
         let directory = folder.path().join(name);
-        let text = std::fs::read_to_string(directory.join("summary.json")).expect("summary.json");
-        Results { summary: serde_json::from_str(&text).expect("valid JSON"), directory, folder }
+        Results { summary: left::summary(&directory), directory, folder }
     }
 
     pub fn into_folder(self) -> TempDir {
@@ -235,17 +233,7 @@ impl Results {
 
     /// A column of `history.csv` by its name without the unit.
     pub fn history(&self, name: &str) -> Vec<f64> {
-        let text = self.text("history.csv");
-        let mut lines = text.lines();
-        let header: Vec<&str> = lines.next().expect("a header").split(',').collect();
-        let column = header
-            .iter()
-            .position(|title| title.split(" [").next() == Some(name))
-            .unwrap_or_else(|| panic!("no column {name} among {header:?}"));
-        lines
-            .map(|line| line.split(',').nth(column).expect("as wide as the header"))
-            .map(|cell| cell.parse().expect("a number"))
-            .collect()
+        left::column(&self.directory, name)
     }
 
     /// Residuals of all attempts at a step, in order.

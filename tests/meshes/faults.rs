@@ -198,3 +198,57 @@ fn domains_that_turn_over() {
         }
     }
 }
+
+/// In space the volume of a CPDI2 domain is not that of its point. Here x = X (1 - 2 Z), y =
+/// Y (1 + 2 Z), z = Z folds a cube of side 2: its mean gradient stays the unit matrix, while the
+/// volume becomes 8 (1 - 4/3).
+#[test]
+fn domains_in_space_that_fold() {
+    let mut deck = String::from(
+        r#"
+title = "fold"
+[analysis]
+type = "quasi-static"
+steps = 1
+[method]
+basis = "cpdi2"
+[grid]
+type = "lattice"
+origin = [-5, -5, -5]
+size = [10, 10, 10]
+h = 2.0
+[material.m]
+model = "hencky"
+young = 1.0
+poisson = 0.0
+[[body]]
+name = "block"
+material = "m"
+shape = { box = { min = [-1, -1, -1], max = [1, 1, 1] } }
+points_per_cell = [1, 1, 1]
+"#,
+    );
+    for corner in 0..8 {
+        let at = |axis: usize| if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+        let [x, y, z] = [at(0), at(1), at(2)];
+        let list = |by: f64| format!("[{}, {}, {}]", x + by, y + by, z + by);
+        deck += &format!(
+            "[[boundary]]\nwhere = {{ box = {{ min = {}, max = {} }} }}\n\
+             displacement = {{ x = {:?}, y = {:?}, z = 0 }}\n",
+            list(-0.1),
+            list(0.1),
+            -2.0 * x * z,
+            2.0 * y * z
+        );
+    }
+    for ranks in [1, 2, 3] {
+        let outcome = Run::text(&deck).ranks(ranks).attempt();
+        let said = outcome.stderr;
+        assert_eq!(outcome.code, 1, "{said}");
+        let words = ["step 1 of 1", "the CPDI2 domain of point ", "is inverted: volume -2.66666"];
+        for word in words.into_iter().chain(["corners [[", "or basis cpdi1 or mpm"]) {
+            assert!(said.contains(word), "no `{word}` in:\n{said}");
+        }
+        assert_eq!(said.matches("error: step 1").count(), 1, "{said}");
+    }
+}

@@ -128,3 +128,73 @@ fn mass_is_bounded_on_simplices() {
     let bare = largest(&triangles.results().history("kappa_mass"));
     assert!(bare > 1e5, "{bare:e}");
 }
+
+/// A body that ends in the tip of one simplex, and a point in the simplex across that tip, which
+/// has two or more empty ones between it and the body on either side.
+fn loose(dimension: usize) -> Run {
+    let (h, per_cell) = (0.125, [16, 8][dimension - 2]);
+    let n = [4, 2][dimension - 2];
+    let axis: Vec<f64> =
+        (0..4 * n).map(|k| 0.5 + (f64::from(k) + 0.5) * h / f64::from(n)).collect();
+    // Off the planes that part the simplices.
+    let shifts = [0.0, -0.03 * h, -0.06 * h];
+    let mut places = vec![Vec::new()];
+    for shift in &shifts[..dimension] {
+        let along =
+            |place: Vec<f64>| axis.iter().map(move |x| [place.as_slice(), &[x + shift]].concat());
+        places = places.into_iter().flat_map(along).collect();
+    }
+    // The simplices where x > y > z; the tip is their corner at the far end of the diagonal.
+    places.retain(|place| place.windows(2).all(|pair| pair[0] > pair[1]));
+    places.push([1.01, 1.02, 1.04][..dimension].to_vec());
+    let volume = h.powi(dimension as i32) / f64::from(per_cell);
+    let rows: Vec<String> = places
+        .iter()
+        .map(|place| {
+            place.iter().map(|x| format!("{x},")).collect::<String>() + &volume.to_string()
+        })
+        .collect();
+    let folder = std::env::temp_dir().join(format!("loose-{dimension}-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).expect("a scratch folder");
+    let csv = folder.join("loose.csv");
+    let header = ["x,y,volume", "x,y,z,volume"][dimension - 2];
+    std::fs::write(&csv, format!("{header}\n{}\n", rows.join("\n"))).expect("writable");
+    let (grid, body) = if dimension == 2 {
+        (box_mesh("[0, 0]", "[2, 2]", "[16, 16]", "tri3"), "disc = {")
+    } else {
+        (box_mesh("[0, 0, 0]", "[2, 2, 2]", "[16, 16, 16]", "tet4"), "ball = {")
+    };
+    let run = round(&grid, dimension, 0.0625, 1);
+    run.replaced(|text| {
+        let begin = text.find("lattice = {").expect("a seeding");
+        let end = begin + text[begin..].find("[[boundary]]").expect("a boundary");
+        assert!(text[begin..end].contains(body), "{text}");
+        let points = format!("shape = {{ points = {:?} }}\n", csv.display().to_string());
+        format!("{}{points}{}", &text[..begin], &text[end..])
+    })
+}
+
+/// A simplex that holds on by a node only, behind two empty ones, is tied to the body: without
+/// that the one point in it would leave its other nodes undetermined.
+#[test]
+fn simplices_behind_two_empty_ones_are_tied() {
+    for dimension in [2, 3] {
+        let run = loose(dimension);
+        let names = ["kappa_mass_ghost", "kappa_stiffness_ghost", "ghost_faces"];
+        let of = |ranks: usize| {
+            let results = run.clone().ranks(ranks).results();
+            names.map(|name| results.history(name)[0])
+        };
+        let one = of(1);
+        assert!(one[0] < 1e3 && one[1] < 3e3, "{dimension}D: {one:?}");
+        for ranks in [2, 3, 4] {
+            let several = of(ranks);
+            for (a, b) in several.iter().zip(&one) {
+                assert!(
+                    (a / b - 1.0).abs() < 1e-8,
+                    "{ranks} ranks, {dimension}D: {several:?} {one:?}"
+                );
+            }
+        }
+    }
+}

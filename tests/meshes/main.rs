@@ -10,6 +10,8 @@ mod cpdi;
 mod doughnut;
 mod faults;
 mod ghost;
+mod irregular;
 mod manufactured;
 mod ranks;
 mod stretch;
+mod unstructured;

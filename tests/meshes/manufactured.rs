@@ -2,7 +2,7 @@
 
 use crate::common::run::Run;
 
-fn order(coarse: f64, fine: f64) -> f64 {
+pub fn order(coarse: f64, fine: f64) -> f64 {
     (coarse / fine).log2()
 }
 

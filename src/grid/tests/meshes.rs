@@ -162,6 +162,48 @@ fn the_jump_across_a_diagonal_is_the_slope() {
     }
 }
 
+/// Two simplices that share a node only are tied by the jump of their whole gradient: none for a
+/// linear field, some for most pairs of others.
+#[test]
+fn simplices_with_a_common_node_are_tied_by_their_gradients() {
+    fn check<const D: usize>(mesh: Mesh<D>) {
+        let grid = Grid::Mesh(mesh);
+        let Grid::Mesh(mesh) = &grid else { unreachable!("just made") };
+        let shares =
+            |a: usize, b: usize| mesh.nodes_of(a).iter().any(|n| mesh.nodes_of(b).contains(n));
+        let mut faces = Vec::new();
+        mesh.face_neighbours(0, &mut faces);
+        let (mut tied, mut kinked, mut refused) = (0, 0, 0);
+        for upper in (1..mesh.cell_count()).filter(|cell| !faces.contains(cell)) {
+            let pair = FacePair { lower: 0, upper };
+            if !shares(0, upper) {
+                refused += usize::from(grid.face_jump(pair).is_err());
+                continue;
+            }
+            tied += 1;
+            let jump = grid.face_jump(pair).unwrap();
+            assert!(jump.nodes.is_sorted_by(|a, b| a < b) && jump.points.len() == D);
+            let of = |f: &dyn Fn([f64; D]) -> f64| -> Vec<f64> {
+                let values: Vec<f64> =
+                    jump.nodes.iter().map(|&n| f(mesh.node_position(n))).collect();
+                let sum = |j: &Vec<f64>| j.iter().zip(&values).map(|(j, v)| j * v).sum();
+                jump.points.iter().map(|(_, j)| sum(j)).collect()
+            };
+            for value in of(&|x| 2.0 + (0..D).map(|a| (a as f64 - 0.4) * x[a]).sum::<f64>()) {
+                assert!(value.abs() < 1e-10, "{value}");
+            }
+            kinked += usize::from(of(&|x| x[0] * x[0] + x[1]).iter().any(|v| v.abs() > 1e-3));
+            for (weight, _) in &jump.points {
+                assert!((jump.size.powi(D as i32 - 1) - weight).abs() < 1e-12 * weight);
+            }
+        }
+        assert!(tied > 0 && 2 * kinked > tied && refused > 0, "{tied} {kinked} {refused}");
+    }
+    check(box_mesh([0.0; 2], [1.0; 2], [3, 3], Element::Tri3).unwrap());
+    check(ring([6.0, 4.0], Element::Tri3, 3.0));
+    check(wavy_box(Element::Tet4));
+}
+
 #[test]
 fn rings_have_the_area_of_their_polygons_and_tags_on_the_curves() {
     for element in [Element::Quad4, Element::Tri3] {
