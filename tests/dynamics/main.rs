@@ -20,3 +20,5 @@ mod restart;
 mod space;
 mod stretch;
 mod table_3;
+mod table_3_masses;
+mod table_3_shapes;
