@@ -65,8 +65,6 @@ pub struct Discretisation<const D: usize> {
     pub faces: Vec<FaceStencil>,
     pub numbering: Numbering,
     pub pattern: Pattern,
-    /// Sum of basis weights at each local node, over all ranks.
-    pub node_weight: Vec<f64>,
     /// How firmly each local node holds material: the weight, and for `mpm` the size of the
     /// gradients too, which is finite where a point on a cell's edge has no weight.
     pub node_grip: Vec<f64>,
@@ -165,23 +163,19 @@ impl<const D: usize> Discretisation<D> {
             nodes.iter().filter_map(|&node| numbering.local(node).map(|i| i as u32)).collect()
         };
         let group_nodes = locals(&groups.nodes);
-        let mut node_weight = vec![0.0; numbering.len()];
         let mut node_grip = vec![0.0; numbering.len()];
-        let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
-        for (p, &group) in groups.group_of_point.iter().enumerate() {
-            let nodes = &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
-            for (&node, entry) in nodes.iter().zip(influences.row(p)) {
-                let weight = influences.weights[entry];
-                node_weight[node as usize] += weight;
-                if coupling != Coupling::Matrix {
-                    continue;
+        if coupling == Coupling::Matrix {
+            let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
+            for (p, &group) in groups.group_of_point.iter().enumerate() {
+                let nodes =
+                    &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
+                for (&node, entry) in nodes.iter().zip(influences.row(p)) {
+                    let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>();
+                    node_grip[node as usize] +=
+                        influences.weights[entry].abs() + reach * slope.sqrt();
                 }
-                let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>().sqrt();
-                node_grip[node as usize] += weight.abs() + reach * slope;
             }
         }
-        numbering.halo.reverse_add(world, &mut node_weight, 1)?;
-        numbering.halo.forward(world, &mut node_weight, 1)?;
         let mut on_face = vec![0.0; numbering.len()];
         if coupling == Coupling::Matrix {
             for face in &faces {
@@ -202,7 +196,6 @@ impl<const D: usize> Discretisation<D> {
             faces,
             numbering,
             pattern,
-            node_weight,
             node_grip,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
@@ -222,6 +215,22 @@ impl<const D: usize> Discretisation<D> {
             groups: &self.groups,
             group_nodes: &self.group_nodes,
         }
+    }
+
+    /// Sum of basis weights at each local node, over all ranks. Collective.
+    pub fn node_weights(&self, world: &World) -> Result<Vec<f64>> {
+        let mut sums = vec![0.0; self.numbering.len()];
+        let (groups, influences) = (&self.groups, &self.influences);
+        for (p, &group) in groups.group_of_point.iter().enumerate() {
+            let nodes = groups.node_offsets[group]..groups.node_offsets[group + 1];
+            let weights = &influences.weights[influences.row(p)];
+            for (&node, weight) in self.group_nodes[nodes].iter().zip(weights) {
+                sums[node as usize] += weight;
+            }
+        }
+        self.numbering.halo.reverse_add(world, &mut sums, 1)?;
+        self.numbering.halo.forward(world, &mut sums, 1)?;
+        Ok(sums)
     }
 
     /// Local nodes that carry no equation of their own: their grip on the material is at most

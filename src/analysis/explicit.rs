@@ -56,7 +56,7 @@ pub fn run<const D: usize>(
         let number = steps.number();
         let at = |why: &str| format!("step {number} (to t = {:.6e} s): {why}", span.time_end);
         // The points are as they were where a step fails.
-        before.record(points);
+        before.record(points, model.deck.method.basis);
         let (mut solved, sums) = match advance(world, model, points, clock, span) {
             Ok(done) => done,
             Err(Error::Run(why)) => {

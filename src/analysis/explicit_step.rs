@@ -63,13 +63,6 @@ pub(super) fn advance<const D: usize>(
         let step = mesh.step_points(points, &model.materials);
         GridMass::assemble(world, &mesh, step, deck.method.mass)
     })?;
-    let mut solving = 0.0;
-    let mut timed = |work: &mut dyn FnMut() -> Result<Vec<f64>>| {
-        let begin = Instant::now();
-        let outcome = work();
-        solving += begin.elapsed().as_secs_f64();
-        outcome
-    };
     // Before the stress is updated last, one pass over the points gives both sums.
     let mut force = None;
     let sums = clock.time(Phase::Assemble, || {
@@ -81,19 +74,33 @@ pub(super) fn advance<const D: usize>(
         force = Some(sum);
         Ok(momentum)
     })?;
-    let mut inverse = None;
-    let mut velocity = timed(&mut || {
-        let inverse = inverse.insert(mass.inverse(world, grid, &mesh, &conditions.fixed)?);
-        let step = mesh.step_points(points, &model.materials);
-        let velocity = inverse.solve(sums.clone(), &held_velocity)?;
-        match deck.method.xpic {
-            Some(order) => sharpen(inverse, step, velocity, order, &at_rest, nodes),
-            None => Ok(velocity),
-        }
-    })?;
-    let Some(inverse) = inverse.as_mut() else {
-        return Err(Error::Run("the mass matrix was not prepared".into()));
+    // Nodal forces with the shares of all ranks; what is pushed must have mass.
+    let pushed_by = |force: &[[f64; D]]| -> Result<Vec<[f64; D]>> {
+        let mut pushed = force.to_vec();
+        numbering.halo.reverse_add(world, pushed.as_flattened_mut(), D)?;
+        require_mass(world, grid, &mesh, &mass, &conditions.fixed, &pushed)?;
+        Ok(pushed)
     };
+    let mut solving = 0.0;
+    let mut inverse = timed(&mut solving, || mass.inverse(world, grid, &mesh, &conditions.fixed))?;
+    let mut pushed = None;
+    let mut acceleration = None;
+    let mut velocity = match &force {
+        Some(force) => {
+            pushed = Some(pushed_by(force)?);
+            let both = [sums, force.clone()];
+            let prescribed: [&[f64]; 2] = [&held_velocity, &at_rest];
+            let [velocity, solved] = timed(&mut solving, || inverse.solve_two(both, prescribed))?;
+            acceleration = Some(solved);
+            velocity
+        }
+        None => timed(&mut solving, || inverse.solve(sums, &held_velocity))?,
+    };
+    if let Some(order) = deck.method.xpic {
+        let step = mesh.step_points(points, &model.materials);
+        velocity =
+            timed(&mut solving, || sharpen(&mut inverse, step, velocity, order, &at_rest, nodes))?;
+    }
 
     let flip = deck.method.flip;
     let carrier = transport::carrier(
@@ -112,9 +119,8 @@ pub(super) fn advance<const D: usize>(
         let step = mesh.step_points(points, &model.materials);
         if carrier == Carrier::RemappedBack && flip < 1.0 {
             let shared = blend(flip, &points.velocity, &mapping::at_points(step, &velocity));
-            deforming = timed(&mut || {
-                inverse.solve(mapping::momentum(step, &shared, nodes), &held_velocity)
-            })?;
+            let sums = mapping::momentum(step, &shared, nodes);
+            deforming = timed(&mut solving, || inverse.solve(sums, &held_velocity))?;
         } else {
             deforming.clone_from(&velocity);
         }
@@ -130,10 +136,14 @@ pub(super) fn advance<const D: usize>(
         None => clock
             .time(Phase::Assemble, || Ok(mapping::force(step, &external, &deformation, nodes)))?,
     };
-    let mut pushed = force.clone();
-    numbering.halo.reverse_add(world, pushed.as_flattened_mut(), D)?;
-    require_mass(world, grid, &mesh, &mass, &conditions.fixed, &pushed)?;
-    let acceleration = timed(&mut || inverse.solve(force.clone(), &at_rest))?;
+    let pushed = match pushed {
+        Some(pushed) => pushed,
+        None => pushed_by(&force)?,
+    };
+    let acceleration = match acceleration {
+        Some(acceleration) => acceleration,
+        None => timed(&mut solving, || inverse.solve(force, &at_rest))?,
+    };
     for (v, a) in velocity.iter_mut().zip(&acceleration) {
         *v += dt * a;
     }
@@ -145,10 +155,8 @@ pub(super) fn advance<const D: usize>(
     let mut moving = velocity.clone();
     let mut again = None;
     if carrier.needs_solve() || musl {
-        let solved = timed(&mut || {
-            let sums = mapping::momentum(step, &new_velocity, nodes);
-            inverse.solve_near(sums, &held_velocity, &velocity)
-        })?;
+        let sums = mapping::momentum(step, &new_velocity, nodes);
+        let solved = timed(&mut solving, || inverse.solve_near(sums, &held_velocity, &velocity))?;
         if carrier.needs_solve() {
             moving.clone_from(&solved);
         }
@@ -241,6 +249,14 @@ pub(super) fn advance<const D: usize>(
     };
     let sums = StepSums { energies, ghost, work };
     Ok((Solved { row, mesh, displacement, reaction }, sums))
+}
+
+/// Does `work` and adds its wall seconds to `seconds`.
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let begin = Instant::now();
+    let outcome = work();
+    *seconds += begin.elapsed().as_secs_f64();
+    outcome
 }
 
 /// share a + (1 - share) b at each point.

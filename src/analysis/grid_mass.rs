@@ -149,6 +149,24 @@ impl<const D: usize> Inverse<'_, D> {
         self.solve_from(sums, prescribed, Some(guess))
     }
 
+    /// [`Self::solve`] of two right-hand sides at once.
+    pub fn solve_two(
+        &mut self,
+        sums: [Vec<[f64; D]>; 2],
+        prescribed: [&[f64]; 2],
+    ) -> Result<[Vec<f64>; 2]> {
+        let [mut one, mut two] = sums;
+        let How::Consistent(inverse) = &mut self.how else {
+            return Ok([self.solve(one, prescribed[0])?, self.solve(two, prescribed[1])?]);
+        };
+        let numbering = &self.mesh.numbering;
+        for sums in [&mut one, &mut two] {
+            numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
+        }
+        let owned = numbering.owned * D;
+        inverse.solve_two([&one.as_flattened()[..owned], &two.as_flattened()[..owned]], prescribed)
+    }
+
     fn solve_from(
         &mut self,
         mut sums: Vec<[f64; D]>,

@@ -71,7 +71,7 @@ pub fn run<const D: usize>(
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
         // The points are as they were where a step fails.
-        before.record(points);
+        before.record(points, model.deck.method.basis);
         let outcome = match solve_step(world, model, points, recorder, clock, span, number) {
             Ok(Ok(solved)) => {
                 let mut row = solved.row.clone();

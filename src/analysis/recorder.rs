@@ -351,13 +351,14 @@ impl Recorder {
                 cells.push(on_face.contains(&cell));
             }
         }
+        let weights = mesh.node_weights(world)?;
         let frame = GridFrame {
             element: model.grid.element(),
             coordinates: &coordinates,
             connectivity: &connectivity,
             displacement_increment: &per_node(&displacement[..owned * D]),
             reaction: &per_node(reaction),
-            node_fields: &[("weight", &mesh.node_weight[..owned])],
+            node_fields: &[("weight", &weights[..owned])],
             ghost_boundary: &cells,
             cell_fields: &[],
         };

@@ -237,7 +237,8 @@ pub struct Snapshot<const D: usize> {
 }
 
 impl<const D: usize> Snapshot<D> {
-    pub fn record(&mut self, points: &Points<D>) {
+    /// `basis`: corners move with `cpdi2` only.
+    pub fn record(&mut self, points: &Points<D>, basis: Basis) {
         self.position.clone_from(&points.position);
         self.velocity.clone_from(&points.velocity);
         self.acceleration.clone_from(&points.acceleration);
@@ -247,7 +248,9 @@ impl<const D: usize> Snapshot<D> {
         self.plastic_strain.clone_from(&points.plastic_strain);
         self.dissipation.clone_from(&points.dissipation);
         self.half_length.clone_from(&points.half_length);
-        self.corners.clone_from(&points.corners);
+        if basis == Basis::Cpdi2 {
+            self.corners.clone_from(&points.corners);
+        }
     }
 
     /// The points as they were recorded.
@@ -261,7 +264,9 @@ impl<const D: usize> Snapshot<D> {
         points.plastic_strain.clone_from(&self.plastic_strain);
         points.dissipation.clone_from(&self.dissipation);
         points.half_length.clone_from(&self.half_length);
-        points.corners.clone_from(&self.corners);
+        if !self.corners.is_empty() {
+            points.corners.clone_from(&self.corners);
+        }
     }
 }
 

@@ -1,9 +1,9 @@
 //! M x = b (Ghost eq. 6, 10) for all components at once, with values prescribed at some nodes.
 //!
 //! Small systems of one rank are factored; larger ones are solved by conjugate gradients
-//! preconditioned along grid lines ([`super::lines`]), all components in lockstep over one sweep of the scalar matrix and
-//! one reduction. With any PETSc option `-mass_...` the system goes to PETSc instead (default
-//! there: `cg`, `jacobi`, relative tolerance 1e-14), component by component.
+//! ([`super::iteration`]) with an incomplete factor as preconditioner, all components in lockstep.
+//! With any PETSc option `-mass_...` the system goes to PETSc instead (default there: `cg`,
+//! `jacobi`, relative tolerance 1e-14), component by component.
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -11,15 +11,10 @@ use crate::parallel::World;
 use crate::petsc::{Ksp, Matrix, options};
 
 use super::envelope::{self, Envelope};
-use super::lines::Lines;
+use super::incomplete::Incomplete;
+use super::iteration::Iteration;
 use super::{BlockMatrix, Numbering, Pattern, mass};
 
-/// Relative residual of the iteration, in the norm of the preconditioner.
-const TOLERANCE: f64 = 1e-14;
-/// Where round-off stops the iteration above [`TOLERANCE`], this much is accepted.
-const ACCEPTABLE: f64 = 1e-10;
-/// Iterations; the worst well-posed systems take a few hundred.
-const MOST_ITERATIONS: usize = 5000;
 /// Factoring wins while its operations per stored entry stay below this.
 const FACTOR_BELOW: f64 = 60.0;
 
@@ -44,10 +39,16 @@ enum Method<const D: usize> {
 }
 
 struct Start {
-    lines: Lines,
-    /// The lumped mass, per owned node: where the iteration starts. For a constant field that is
-    /// the solution. Zero where there is no mass.
+    preconditioner: Incomplete,
     inverse_row_sum: Vec<f64>,
+}
+
+/// A right-hand side with what is prescribed taken to it, and what is prescribed.
+struct Prepared {
+    /// Owned degrees of freedom, zero where held.
+    b: Vec<f64>,
+    /// Local ones, zero where free.
+    x: Vec<f64>,
 }
 
 impl<'a, const D: usize> MassInverse<'a, D> {
@@ -84,7 +85,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         } else {
             let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
             Method::Iterative(Box::new(Start {
-                lines: Lines::factor(grid, numbering, pattern, matrix, &diagonal),
+                preconditioner: Incomplete::factor(matrix, pattern, &diagonal),
                 inverse_row_sum: mass::row_sums(matrix, pattern, rows)
                     .iter()
                     .map(one_over)
@@ -108,6 +109,45 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         prescribed: &[f64],
         guess: Option<&[f64]>,
     ) -> Result<Vec<f64>> {
+        let prepared = self.prepare(rhs, prescribed)?;
+        let solution = match &self.method {
+            Method::Iterative(start) => {
+                let guess = guess.map(|guess| self.freed(guess));
+                let guess = guess.as_ref().map(|guess| guess.as_chunks::<D>().0);
+                let (b, free) = (prepared.b.as_chunks::<D>().0, self.free.as_chunks::<D>().0);
+                let (x, iterations) = self.iteration(start).solve(b, free, guess)?;
+                self.iterations += iterations;
+                x.into_flattened()
+            }
+            _ => self.solve_directly(prepared.b)?,
+        };
+        self.complete(solution, prepared.x)
+    }
+
+    /// [`Self::solve`] for two right-hand sides, in one iteration where there is one.
+    pub fn solve_two(
+        &mut self,
+        rhs: [&[f64]; 2],
+        prescribed: [&[f64]; 2],
+    ) -> Result<[Vec<f64>; 2]> {
+        let Method::Iterative(start) = &self.method else {
+            return Ok([self.solve(rhs[0], prescribed[0])?, self.solve(rhs[1], prescribed[1])?]);
+        };
+        let first = self.prepare(rhs[0], prescribed[0])?;
+        let second = self.prepare(rhs[1], prescribed[1])?;
+        let iteration = self.iteration(start);
+        // Twice D is not a constant that the language can compute from D.
+        let (solutions, iterations) = match D {
+            2 => side_by_side::<D, 4>(&iteration, [&first.b, &second.b], &self.free)?,
+            _ => side_by_side::<D, 6>(&iteration, [&first.b, &second.b], &self.free)?,
+        };
+        self.iterations += iterations;
+        let [one, two] = solutions;
+        Ok([self.complete(one, first.x)?, self.complete(two, second.x)?])
+    }
+
+    /// Collective. Error: a right-hand side that is not finite.
+    fn prepare(&self, rhs: &[f64], prescribed: &[f64]) -> Result<Prepared> {
         let owned = self.numbering.owned * D;
         let mut x = vec![0.0; self.numbering.len() * D];
         let mut moved = false;
@@ -137,16 +177,11 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                 *b = 0.0;
             }
         }
-        let solution = match &self.method {
-            Method::Direct(factors, which) => {
-                for (k, &factor) in which.iter().enumerate() {
-                    factors[factor].solve(&mut b, D, k);
-                }
-                b
-            }
-            Method::Iterative(_) => self.conjugate_gradients(&b, guess)?,
-            Method::Petsc(_) => self.by_petsc(&b)?,
-        };
+        Ok(Prepared { b, x })
+    }
+
+    /// The free values of `solution` put into `x`, and both brought to the ghosts. Collective.
+    fn complete(&self, solution: Vec<f64>, mut x: Vec<f64>) -> Result<Vec<f64>> {
         for (dof, value) in solution.into_iter().enumerate() {
             if self.free[dof] {
                 x[dof] = value;
@@ -156,115 +191,29 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         Ok(x)
     }
 
-    fn conjugate_gradients(&mut self, b: &[f64], guess: Option<&[f64]>) -> Result<Vec<f64>> {
-        let Method::Iterative(start) = &self.method else { return Ok(b.to_vec()) };
-        let (world, owned) = (self.world, b.len());
-        let precondition = |r: &[f64], z: &mut [f64]| start.lines.apply::<D>(r, &self.free, z);
-        // Local: the product reads ghosts.
-        let mut p = vec![0.0; self.numbering.len() * D];
-        let mut product = vec![0.0; owned];
-        for (dof, b) in b.iter().enumerate() {
-            p[dof] = match guess {
-                Some(guess) if self.free[dof] => guess[dof],
-                Some(_) => 0.0,
-                None => b * start.inverse_row_sum[dof / D],
-            };
-        }
-        let mut x = p[..owned].to_vec();
-        self.numbering.halo.forward(world, &mut p, D)?;
-        self.multiply_free(&p, &mut product);
-        let mut r: Vec<f64> = b.iter().zip(&product).map(|(b, p)| b - p).collect();
-        p.fill(0.0);
-        let mut z = vec![0.0; owned];
-        let dot = |a: &[f64], b: &[f64]| -> Vec<f64> {
-            let mut sums = [0.0; D];
-            for (a, b) in a.chunks_exact(D).zip(b.chunks_exact(D)) {
-                for k in 0..D {
-                    sums[k] += a[k] * b[k];
-                }
-            }
-            world.sum_slice(&sums)
-        };
-        precondition(b, &mut z);
-        let whole = dot(b, &z);
-        precondition(&r, &mut z);
-        let mut size = dot(&r, &z);
-        // Accelerations of nearly empty nodes are no place to start from.
-        let restart: [bool; D] = std::array::from_fn(|k| !(size[k] < whole[k]));
-        if restart.contains(&true) {
-            for dof in (0..owned).filter(|dof| restart[dof % D]) {
-                (x[dof], r[dof]) = (0.0, b[dof]);
-            }
-            precondition(&r, &mut z);
-            size = dot(&r, &z);
-        }
-        let mut factor = [0.0; D];
-        let mut iteration = 0;
-        loop {
-            let active: [bool; D] =
-                std::array::from_fn(|k| size[k] > TOLERANCE * TOLERANCE * whole[k]);
-            if !active.contains(&true) {
-                break;
-            }
-            if iteration == MOST_ITERATIONS || size.iter().any(|s| !s.is_finite()) {
-                let worst = size.iter().zip(&whole).map(|(s, t)| s / t).fold(0.0, f64::max).sqrt();
-                if worst <= ACCEPTABLE {
-                    break;
-                }
-                return Err(Error::Run(format!(
-                    "the iteration for the consistent mass stands at a relative residual of \
-                     {worst:.1e} after {iteration} iterations: the matrix is near singular; \
-                     stabilise it ([ghost] mass_factor = 0.25) or use method.mass = \"lumped\""
-                )));
-            }
-            for (p, z) in p.chunks_exact_mut(D).zip(z.chunks_exact(D)) {
-                for k in 0..D {
-                    p[k] = z[k] + factor[k] * p[k];
-                }
-            }
-            self.numbering.halo.forward(world, &mut p, D)?;
-            self.multiply_free(&p, &mut product);
-            let curvature = dot(&p[..owned], &product);
-            if (0..D).any(|k| active[k] && curvature[k] <= 0.0) {
-                return Err(Error::Run(
-                    "the consistent mass matrix is not positive definite; stabilise it ([ghost] \
-                     mass_factor = 0.25) or use method.mass = \"lumped\""
-                        .into(),
-                ));
-            }
-            let length: [f64; D] =
-                std::array::from_fn(|k| if active[k] { size[k] / curvature[k] } else { 0.0 });
-            let updated = x.chunks_exact_mut(D).zip(r.chunks_exact_mut(D));
-            for ((x, r), (p, product)) in
-                updated.zip(p.chunks_exact(D).zip(product.chunks_exact(D)))
-            {
-                for k in 0..D {
-                    x[k] += length[k] * p[k];
-                    r[k] -= length[k] * product[k];
-                }
-            }
-            precondition(&r, &mut z);
-            let next = dot(&r, &z);
-            for k in 0..D {
-                factor[k] = if active[k] { next[k] / size[k] } else { 0.0 };
-                if active[k] {
-                    size[k] = next[k];
-                }
-            }
-            iteration += 1;
-        }
-        self.iterations += iteration;
-        Ok(x)
+    fn freed(&self, values: &[f64]) -> Vec<f64> {
+        values.iter().zip(&self.free).map(|(v, free)| if *free { *v } else { 0.0 }).collect()
     }
 
-    /// Rows of free degrees of freedom; zero in the others. `x` is zero there too.
-    fn multiply_free(&self, x: &[f64], product: &mut [f64]) {
-        mass::multiply::<D>(self.matrix, self.pattern, x, product);
-        for (value, free) in product.iter_mut().zip(&self.free) {
-            if !free {
-                *value = 0.0;
-            }
+    fn iteration<'b>(&'b self, start: &'b Start) -> Iteration<'b> {
+        Iteration {
+            world: self.world,
+            numbering: self.numbering,
+            pattern: self.pattern,
+            matrix: self.matrix,
+            preconditioner: &start.preconditioner,
+            inverse_row_sum: &start.inverse_row_sum,
         }
+    }
+
+    fn solve_directly(&mut self, mut b: Vec<f64>) -> Result<Vec<f64>> {
+        if let Method::Direct(factors, which) = &self.method {
+            for (k, &factor) in which.iter().enumerate() {
+                factors[factor].solve(&mut b, D, k);
+            }
+            return Ok(b);
+        }
+        self.by_petsc(&b)
     }
 
     fn by_petsc(&mut self, b: &[f64]) -> Result<Vec<f64>> {
@@ -317,6 +266,25 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         }
         Ok(values)
     }
+}
+
+/// Two right-hand sides of `D` values per node as one of `C` = 2 `D`.
+fn side_by_side<const D: usize, const C: usize>(
+    iteration: &Iteration<'_>,
+    rhs: [&[f64]; 2],
+    free: &[bool],
+) -> Result<([Vec<f64>; 2], usize)> {
+    let joined = |k: usize, node: usize| rhs[k / D][node * D + k % D];
+    let nodes = free.len() / D;
+    let b: Vec<[f64; C]> =
+        (0..nodes).map(|node| std::array::from_fn(|k| joined(k, node))).collect();
+    let free: Vec<[bool; C]> =
+        (0..nodes).map(|node| std::array::from_fn(|k| free[node * D + k % D])).collect();
+    let (x, iterations) = iteration.solve(&b, &free, None)?;
+    let part = |side: usize| -> Vec<f64> {
+        x.iter().flat_map(|x| x[side * D..side * D + D].iter().copied()).collect()
+    };
+    Ok(([part(0), part(1)], iterations))
 }
 
 fn petsc_solver(world: &World) -> Result<Ksp> {

@@ -13,7 +13,8 @@
 //! | `plain.rs` | the same sums once more, written as the formulas read |
 //! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
 //! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
-//! | `lines.rs` | its preconditioner: tridiagonal factors along grid lines |
+//! | `iteration.rs` | conjugate gradients on several right-hand sides |
+//! | `incomplete.rs` | their preconditioner: Cholesky without fill |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
@@ -23,10 +24,11 @@ pub mod conditions;
 pub mod envelope;
 pub mod external;
 pub mod graph;
+mod incomplete;
 pub mod internal;
 pub mod inverse;
+mod iteration;
 mod kernel;
-mod lines;
 pub mod manufactured;
 pub mod mass;
 pub mod node_index;

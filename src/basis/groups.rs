@@ -27,21 +27,22 @@ impl Groups {
         groups.group_of_point.reserve(count);
         // Ends and length say nearly all (on a lattice: all) about a row; rows that share them
         // but differ inside are chained.
-        let mut first_with: FxHashMap<[usize; 3], usize> = FxHashMap::default();
+        let mut first_with: FxHashMap<[usize; 3], usize> =
+            FxHashMap::with_capacity_and_hasher(count / 4, Default::default());
         let mut next_with: Vec<Option<usize>> = Vec::new();
         let mut sizes: Vec<usize> = Vec::new();
         for p in 0..count {
             let row = &influences.nodes[influences.row(p)];
             // Sorted points mostly repeat their predecessor's row.
             let before = groups.group_of_point.last().copied();
-            let group = match before.filter(|&g| groups.nodes(g) == row) {
+            let group = match before.filter(|&g| same(groups.nodes(g), row)) {
                 Some(same) => same,
                 None => {
                     let ends = |i: Option<&usize>| i.copied().unwrap_or(usize::MAX);
                     let key = [ends(row.first()), ends(row.last()), row.len()];
                     let head = first_with.get(&key).copied();
                     let mut found = head;
-                    while let Some(g) = found.filter(|&g| groups.nodes(g) != row) {
+                    while let Some(g) = found.filter(|&g| !same(groups.nodes(g), row)) {
                         found = next_with[g];
                     }
                     found.unwrap_or_else(|| {
@@ -98,4 +99,10 @@ impl Groups {
             cursor[group] += 1;
         }
     }
+}
+
+/// Rows are too short for the call that comparing slices would make.
+#[inline]
+fn same(a: &[usize], b: &[usize]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a == b)
 }

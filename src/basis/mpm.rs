@@ -3,37 +3,56 @@
 //! A point on a grid line belongs to the upper cell ([`Grid::locate`]); the row holds all nodes
 //! of its cell, also those with weight zero.
 
-use super::product::{Line, push_row};
 use super::{Influences, outside, row};
 use crate::error::Result;
-use crate::grid::Grid;
 use crate::grid::locate::REACH;
+use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
 pub(super) fn map_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
-    let mut influences = Influences::with_capacity(points.len(), 1 << D);
     match grid {
-        Grid::Lattice(lattice) => {
-            let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
-            for p in 0..points.len() {
-                let x = &points.position[p];
-                let cell = lattice.locate(x).ok_or_else(|| outside(grid, points, p))?;
-                let low = lattice.cell_index(cell);
-                for axis in 0..D {
-                    let local = lattice.scaled(axis, x[axis]) - low[axis] as f64;
-                    let slope = 1.0 / lattice.spacing[axis];
-                    let line = &mut lines[axis];
-                    line.reset(low[axis], 2);
-                    line.weights.copy_from_slice(&[1.0 - local, local]);
-                    line.slopes.copy_from_slice(&[-slope, slope]);
-                }
-                push_row(lattice, &lines, &mut influences);
-            }
+        Grid::Lattice(lattice) => map_points_on_lattice(grid, lattice, points),
+        Grid::Mesh(_) => map_points_on_mesh(grid, points),
+    }
+}
+
+/// S = prod_a (1 - t_a or t_a), t the position within the cell in cells.
+fn map_points_on_lattice<const D: usize>(
+    grid: &Grid<D>,
+    lattice: &Lattice<D>,
+    points: &Points<D>,
+) -> Result<Influences<D>> {
+    let mut influences = Influences::with_capacity(points.len(), 1 << D);
+    let slope = lattice.spacing.map(|h| 1.0 / h);
+    let corners = lattice.corner_offsets();
+    for (p, x) in points.position.iter().enumerate() {
+        let low = lattice.cell_of(x).ok_or_else(|| outside(grid, points, p))?;
+        let lowest = lattice.node_at(low);
+        let mut weights = [[0.0; 2]; D];
+        for axis in 0..D {
+            let local = lattice.scaled(axis, x[axis]) - low[axis] as f64;
+            weights[axis] = [1.0 - local, local];
         }
-        Grid::Mesh(_) => return map_points_on_mesh(grid, points),
+        for (corner, offset) in corners.iter().enumerate().take(1 << D) {
+            let upper: [usize; D] = std::array::from_fn(|axis| corner >> axis & 1);
+            let mut weight = 1.0;
+            let mut gradient: [f64; D] =
+                std::array::from_fn(|a| if upper[a] == 1 { slope[a] } else { -slope[a] });
+            for a in 0..D {
+                let factor = weights[a][upper[a]];
+                weight *= factor;
+                for b in 0..D {
+                    if b != a {
+                        gradient[b] *= factor;
+                    }
+                }
+            }
+            influences.push(lowest + offset, weight, gradient);
+        }
+        influences.close_row();
     }
     Ok(influences)
 }

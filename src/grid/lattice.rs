@@ -73,7 +73,14 @@ impl<const D: usize> Lattice<D> {
     }
 
     /// The cell that holds `x` (half-open; the grid's upper edge is closed), `None` outside.
+    #[inline]
     pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
+        self.cell_of(x).map(|index| self.cell_at(index))
+    }
+
+    /// [`Self::locate`], as the cell's index along each axis.
+    #[inline]
+    pub fn cell_of(&self, x: &[f64; D]) -> Option<[usize; D]> {
         let mut index = [0; D];
         for axis in 0..D {
             let t = self.scaled(axis, x[axis]);
@@ -84,12 +91,18 @@ impl<const D: usize> Lattice<D> {
             // Round-off must not split a row of points that lie on one grid line.
             index[axis] = ((t + LINE_TOLERANCE).max(0.0) as usize).min(n - 1);
         }
-        Some(self.cell_at(index))
+        Some(index)
     }
 
     /// Lowest-numbered cell at a node.
     pub fn lowest_cell(&self, node: usize) -> usize {
         self.cell_at(self.node_index(node).map(|i| i.saturating_sub(1)))
+    }
+
+    /// Distance in numbering of a cell's nodes from its lowest one, first axis fastest; the first
+    /// 2^D count.
+    pub fn corner_offsets(&self) -> [usize; 8] {
+        std::array::from_fn(|corner| self.node_at(std::array::from_fn(|axis| corner >> axis & 1)))
     }
 
     /// Appends the cell's nodes in hex8 order.

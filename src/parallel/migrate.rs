@@ -9,7 +9,7 @@ use crate::grid::Grid;
 use crate::points::Points;
 use crate::points::sort::sort_by_cell;
 
-/// Moves the points and leaves each rank's sorted by (cell, id). Returns how many changed rank,
+/// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns how many changed rank,
 /// over all ranks. Collective. Error, the same on all ranks: a point outside the grid; no point
 /// has been moved then.
 pub fn migrate<const D: usize>(
@@ -22,10 +22,18 @@ pub fn migrate<const D: usize>(
     let here = world.rank();
     let mut stay = Vec::with_capacity(points.len());
     let mut outgoing: FxHashMap<usize, Vec<f64>> = FxHashMap::default();
+    // Neighbours in memory mostly share their cell.
+    let mut last = None;
     for (p, &cell) in cells.iter().enumerate() {
-        match partition.owner_of_cell(grid, cell) {
-            owner if owner == here => stay.push(p),
-            owner => points.pack(p, outgoing.entry(owner).or_default()),
+        let owner = match last {
+            Some((known, owner)) if known == cell => owner,
+            _ => partition.owner_of_cell(grid, cell),
+        };
+        last = Some((cell, owner));
+        if owner == here {
+            stay.push(p);
+        } else {
+            points.pack(p, outgoing.entry(owner).or_default());
         }
     }
     let moved = world.sum_usize(points.len() - stay.len());
@@ -45,7 +53,7 @@ pub fn migrate<const D: usize>(
             cells.push(cell);
         }
     }
-    sort_by_cell(points, &mut cells);
+    sort_by_cell(points, &cells);
     Ok(moved)
 }
 

@@ -81,6 +81,14 @@ impl Spectrum {
     /// sum_a values_a n_a x n_a with these axes.
     #[inline]
     pub fn compose(&self, values: [f64; 3]) -> Matrix3<f64> {
+        let [first, second, third] = &self.axes;
+        if *third == UNIT[2] && first[2] == 0.0 && second[2] == 0.0 {
+            // In the plane a third of the terms below is left, the same to the last bit.
+            let (u, v) = (first.map(|e| values[0] * e), second.map(|e| values[1] * e));
+            let xy = u[0] * first[1] + v[0] * second[1];
+            let (xx, yy) = (u[0] * first[0] + v[0] * second[0], u[1] * first[1] + v[1] * second[1]);
+            return Matrix3::new(xx, xy, 0.0, xy, yy, 0.0, 0.0, 0.0, values[2]);
+        }
         let mut sum = [0.0; 6];
         for (value, n) in values.iter().zip(&self.axes) {
             let scaled = n.map(|e| value * e);
