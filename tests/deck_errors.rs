@@ -240,6 +240,8 @@ fn checks_of_the_analysis_and_the_method() {
                 "number from 0 (pic) to 1 (flip) >= 0 and <= 1, found 1.5",
             ),
             (&["method.velocity_update=flop"], "did you mean \"flip\"?"),
+            (&["method.position_update=publisht"], "did you mean \"published\"?"),
+            (&["method.position_updates=published"], "did you mean \"position_update\"?"),
             (&["method.xpic_order=3"], "only with velocity_update = \"xpic\""),
             (&["ghost.stiffness_factor=1"], "stiffness is given too"),
             (&["ghost.stiffness="], "expected a stiffness or a mass"),

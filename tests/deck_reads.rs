@@ -73,6 +73,9 @@ fn options_change_the_deck() {
     assert_eq!(deck.method.drop_below, 1e-8);
     let deck = read(BEAM, &["method.velocity_update=xpic", "method.xpic_order=5"]);
     assert_eq!((deck.method.xpic, deck.method.flip), (Some(5), 0.0));
+    assert_eq!(deck.method.position_update, PositionUpdate::Momentum);
+    let deck = read(DYNAMIC, &["method.position_update=published"]);
+    assert_eq!(deck.method.position_update, PositionUpdate::Published);
     let deck = read(BEAM, &["analysis.hht_alpha=-0.1"]);
     assert!((deck.analysis.newmark_beta - 1.1 * 1.1 / 4.0).abs() < 1e-15);
     assert!((deck.analysis.newmark_gamma - 0.6).abs() < 1e-15);

@@ -88,6 +88,7 @@ fn resolved_deck_reads_back_to_the_same_deck() {
         &[
             "method.velocity_update=xpic",
             "method.mass=lumped",
+            "method.position_update=published",
             "parallel.brick=4",
             "petsc.a_b=[]",
             "petsc.a_b=",

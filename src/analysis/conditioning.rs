@@ -19,7 +19,7 @@ use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::{add_scalar, ghost_matrix};
-use super::extremes::{self, Extremes};
+use super::extremes::{Extremes, Reduced};
 use super::mapping;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
@@ -168,7 +168,7 @@ impl<const D: usize> System<D> {
     ) -> Result<Conditioning> {
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let of_stiffness = |matrix: &BlockMatrix<D>| {
-            extremes::of_matrix(world, numbering, pattern, matrix, free).map(Extremes::ratio)
+            Reduced { world, numbering, pattern, matrix, free }.extremes().map(Extremes::ratio)
         };
         let masses = [&self.mass, &self.mass_ghost];
         let stiffnesses = [&self.stiffness, &self.stiffness_ghost];
@@ -186,14 +186,9 @@ impl<const D: usize> System<D> {
             cfl[k] = or_beyond(
                 0.0,
                 inverse.and_then(|mut inverse| {
-                    let largest = extremes::largest_generalised(
-                        world,
-                        numbering,
-                        pattern,
-                        stiffnesses[k],
-                        &mut inverse,
-                        free,
-                    )?;
+                    let matrix = stiffnesses[k];
+                    let reduced = Reduced { world, numbering, pattern, matrix, free };
+                    let largest = reduced.largest_generalised(&mut inverse)?;
                     Ok(1.0 / (model.grid.cell_size() * largest.sqrt()))
                 }),
             )?;
@@ -231,7 +226,8 @@ impl<const D: usize> System<D> {
             let known = before.contains(&mask);
             if world.any(!known) {
                 let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
-                all = all.united(extremes::of_matrix(world, numbering, pattern, matrix, &mask)?);
+                let reduced = Reduced { world, numbering, pattern, matrix, free: &mask };
+                all = all.united(reduced.extremes()?);
             }
             before.push(mask);
         }

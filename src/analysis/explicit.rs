@@ -67,7 +67,8 @@ pub fn run<const D: usize>(
                 recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
                 let culprit = world.first_message(update::not_finite(points));
                 let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
-                return Ok(Ending::failed(at(&format!("{why}{detail}"))));
+                let hint = if why.contains("inside out") { unstabilised(model) } else { "" };
+                return Ok(Ending::failed(at(&format!("{why}{detail}{hint}"))));
             }
             Err(other) => return Err(other),
         };

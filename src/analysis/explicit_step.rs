@@ -104,6 +104,7 @@ pub(super) fn advance<const D: usize>(
 
     let flip = deck.method.flip;
     let carrier = transport::carrier(
+        deck.method.position_update,
         deck.method.stress_update,
         deck.method.mass == Mass::Consistent,
         model.penalties.iter().any(|penalty| penalty.mass > 0.0),

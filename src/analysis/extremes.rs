@@ -45,191 +45,171 @@ impl Extremes {
     }
 }
 
-/// Of a symmetric matrix of `B x B` blocks; `free` per owned row. Collective.
-pub fn of_matrix<const B: usize>(
-    world: &World,
-    numbering: &Numbering,
-    pattern: &Pattern,
-    matrix: &BlockMatrix<B>,
-    free: &[bool],
-) -> Result<Extremes> {
-    let count = world.sum_usize(free.iter().filter(|free| **free).count());
-    if count == 0 {
-        return Ok(Extremes::NONE);
-    }
-    if count <= DENSE_UP_TO {
-        return Ok(dense(world, numbering, pattern, matrix, free, count));
-    }
-    estimate(world, numbering, pattern, matrix, free)
+/// A symmetric matrix of `B x B` blocks without its held degrees of freedom.
+pub struct Reduced<'a, const B: usize> {
+    pub world: &'a World,
+    pub numbering: &'a Numbering,
+    pub pattern: &'a Pattern,
+    pub matrix: &'a BlockMatrix<B>,
+    /// One per owned row.
+    pub free: &'a [bool],
 }
 
-/// Number of each free row among those of all ranks; `None` where held. Local rows (ghosts
-/// included).
-fn reduced_numbers<const B: usize>(
-    world: &World,
-    numbering: &Numbering,
-    free: &[bool],
-) -> Vec<Option<usize>> {
-    let mut next = world.exclusive_sum(free.iter().filter(|free| **free).count());
-    let mut numbers = vec![-1.0; numbering.len() * B];
-    for (number, free) in numbers.iter_mut().zip(free) {
-        if *free {
-            *number = next as f64;
-            next += 1;
+impl<const B: usize> Reduced<'_, B> {
+    /// Smallest and largest eigenvalue. Collective.
+    pub fn extremes(&self) -> Result<Extremes> {
+        let count = self.world.sum_usize(self.free.iter().filter(|free| **free).count());
+        if count == 0 {
+            return Ok(Extremes::NONE);
         }
+        let numbers = self.numbers();
+        if count <= DENSE_UP_TO { Ok(self.dense(&numbers, count)) } else { self.estimate(&numbers) }
     }
-    // Only fails on a broken communicator, which nothing below would survive either.
-    let forwarded = numbering.halo.forward(world, &mut numbers, B);
-    debug_assert!(forwarded.is_ok());
-    numbers.into_iter().map(|n| (n >= 0.0).then_some(n as usize)).collect()
-}
 
-fn dense<const B: usize>(
-    world: &World,
-    numbering: &Numbering,
-    pattern: &Pattern,
-    matrix: &BlockMatrix<B>,
-    free: &[bool],
-    count: usize,
-) -> Extremes {
-    let numbers = reduced_numbers::<B>(world, numbering, free);
-    let mut entries = vec![0.0; count * count];
-    for_each_entry(pattern, numbering.owned, matrix, |row, column, value| {
-        if let (Some(i), Some(j)) = (numbers[row], numbers[column]) {
-            entries[i * count + j] = value;
+    /// Number of each free row among those of all ranks; `None` where held. Local rows (ghosts
+    /// included).
+    fn numbers(&self) -> Vec<Option<usize>> {
+        let (world, numbering) = (self.world, self.numbering);
+        let mut next = world.exclusive_sum(self.free.iter().filter(|free| **free).count());
+        let mut numbers = vec![-1.0; numbering.len() * B];
+        for (number, free) in numbers.iter_mut().zip(self.free) {
+            if *free {
+                *number = next as f64;
+                next += 1;
+            }
         }
-    });
-    // Each entry comes from one rank, so the sum is exact and the same everywhere.
-    let entries = if world.size() > 1 { world.sum_slice(&entries) } else { entries };
-    let values = DMatrix::from_vec(count, count, entries).symmetric_eigenvalues();
-    values.iter().fold(Extremes::NONE, |all, &v| all.united(Extremes { smallest: v, largest: v }))
-}
+        // Only fails on a broken communicator, which nothing below would survive either.
+        let forwarded = numbering.halo.forward(world, &mut numbers, B);
+        debug_assert!(forwarded.is_ok());
+        numbers.into_iter().map(|n| (n >= 0.0).then_some(n as usize)).collect()
+    }
 
-/// Visits (local row, local column, value) of the owned rows.
-fn for_each_entry<const B: usize>(
-    pattern: &Pattern,
-    owned: usize,
-    matrix: &BlockMatrix<B>,
-    mut visit: impl FnMut(usize, usize, f64),
-) {
-    for row in 0..owned {
-        let range = pattern.offsets[row]..pattern.offsets[row + 1];
-        for i in 0..B {
-            let start = B * B * range.start + i * range.len() * B;
-            for (position, &column) in pattern.columns[range.clone()].iter().enumerate() {
-                for k in 0..B {
-                    let value = matrix.values[start + position * B + k];
-                    visit(row * B + i, column as usize * B + k, value);
+    /// Visits (local row, local column, value) of the owned rows.
+    fn for_each_entry(&self, mut visit: impl FnMut(usize, usize, f64)) {
+        let pattern = self.pattern;
+        for row in 0..self.numbering.owned {
+            let range = pattern.offsets[row]..pattern.offsets[row + 1];
+            for i in 0..B {
+                let start = B * B * range.start + i * range.len() * B;
+                for (position, &column) in pattern.columns[range.clone()].iter().enumerate() {
+                    for k in 0..B {
+                        let value = self.matrix.values[start + position * B + k];
+                        visit(row * B + i, column as usize * B + k, value);
+                    }
                 }
             }
         }
     }
+
+    fn dense(&self, numbers: &[Option<usize>], count: usize) -> Extremes {
+        let mut entries = vec![0.0; count * count];
+        self.for_each_entry(|row, column, value| {
+            if let (Some(i), Some(j)) = (numbers[row], numbers[column]) {
+                entries[i * count + j] = value;
+            }
+        });
+        // Each entry comes from one rank, so the sum is exact and the same everywhere.
+        let world = self.world;
+        let entries = if world.size() > 1 { world.sum_slice(&entries) } else { entries };
+        let values = DMatrix::from_vec(count, count, entries).symmetric_eigenvalues();
+        let one = |value: &f64| Extremes { smallest: *value, largest: *value };
+        values.iter().map(one).fold(Extremes::NONE, Extremes::united)
+    }
+
+    fn estimate(&self, numbers: &[Option<usize>]) -> Result<Extremes> {
+        // Held rows decouple and the start is zero there: the iteration never sees them.
+        let numbering = self.numbering;
+        let rows = numbering.owned * B;
+        let (mut offsets, mut columns, mut values) = (vec![0i32], Vec::new(), Vec::new());
+        let mut last = 0;
+        self.for_each_entry(|row, column, value| {
+            if row != last {
+                offsets.push(columns.len() as i32);
+                last = row;
+            }
+            let global = numbering.global[column / B] * B as i32 + (column % B) as i32;
+            columns.push(global);
+            let inside = numbers[row].is_some() && numbers[column].is_some();
+            values.push(if inside { value } else { f64::from(u8::from(row == column)) });
+        });
+        offsets.resize(rows + 1, columns.len() as i32);
+        let comm = self.world.comm();
+        let matrix = Matrix::from_csr(comm, B, rows, &offsets, &columns, &values)?;
+        let (mut right, mut left) = (matrix.vector()?, matrix.vector()?);
+        right.values_mut()?.copy_from_slice(&self.start());
+        let mut ksp = Ksp::new(comm, "kappa_")?;
+        ksp.set_defaults(&[
+            ("ksp_type", "cg"),
+            ("pc_type", "none"),
+            ("ksp_rtol", "1e-10"),
+            ("ksp_max_it", "5000"),
+        ])?;
+        ksp.set_compute_singular_values()?;
+        ksp.set_from_options()?;
+        ksp.set_operators(&matrix)?;
+        ksp.solve(&right, &mut left)?;
+        let (smallest, largest) = ksp.extreme_singular_values()?;
+        Ok(Extremes { smallest, largest })
+    }
+
+    /// Favours no eigenvector; owned rows, zero where held.
+    fn start(&self) -> Vec<f64> {
+        let first = self.numbering.offset * B;
+        let at = |dof: usize| if self.free[dof] { noise(first + dof) } else { 0.0 };
+        (0..self.numbering.owned * B).map(at).collect()
+    }
+
+    /// Largest eigenvalue of K x = lambda M x (Ghost §3.5), K this matrix, by Lanczos' method in
+    /// the inner product of M, to ten digits. Collective.
+    pub fn largest_generalised(&self, mass: &mut MassInverse<'_, B>) -> Result<f64> {
+        let owned = self.numbering.owned * B;
+        let zero = vec![0.0; self.numbering.len() * B];
+        let dot = |a: &[f64], b: &[f64]| -> f64 {
+            self.world.sum(a.iter().zip(b).take(owned).map(|(a, b)| a * b).sum())
+        };
+        let mut weighted = self.start();
+        let mut weighted_before = vec![0.0; owned];
+        let mut vector = mass.solve(&weighted, &zero)?;
+        let mut norm = dot(&vector, &weighted).sqrt();
+        if !(norm > 0.0) {
+            return Ok(0.0);
+        }
+        let (mut diagonal, mut side) = (Vec::new(), Vec::new());
+        let mut found = 0.0;
+        for step in 0..MOST_STEPS {
+            for value in vector.iter_mut().chain(&mut weighted) {
+                *value /= norm;
+            }
+            let mut next = vec![0.0; owned];
+            self.for_each_entry(|row, column, value| next[row] += value * vector[column]);
+            for (value, free) in next.iter_mut().zip(self.free) {
+                *value *= f64::from(u8::from(*free));
+            }
+            let alpha = dot(&next, &vector);
+            let back = if step > 0 { norm } else { 0.0 };
+            for dof in 0..owned {
+                next[dof] -= alpha * weighted[dof] + back * weighted_before[dof];
+            }
+            diagonal.push(alpha);
+            let now = largest_of_tridiagonal(&diagonal, &side);
+            let settled = step > 4 && (now - found).abs() <= 1e-11 * now.abs();
+            found = now;
+            vector = mass.solve(&next, &zero)?;
+            norm = dot(&vector, &next).max(0.0).sqrt();
+            if settled || !(norm > 1e-13 * found.abs()) {
+                break;
+            }
+            side.push(norm);
+            weighted_before = std::mem::replace(&mut weighted, next);
+        }
+        Ok(found)
+    }
 }
 
-/// A start that depends on the node's number alone and favours no eigenvector.
+/// A number that depends on the node's alone.
 fn noise(number: usize) -> f64 {
     let mixed = (number as u64 + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     (mixed >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-}
-
-fn estimate<const B: usize>(
-    world: &World,
-    numbering: &Numbering,
-    pattern: &Pattern,
-    matrix: &BlockMatrix<B>,
-    free: &[bool],
-) -> Result<Extremes> {
-    // Held rows decouple and the start is zero there: the iteration never sees them.
-    let rows = numbering.owned * B;
-    let numbers = reduced_numbers::<B>(world, numbering, free);
-    let (mut offsets, mut columns, mut values) = (vec![0i32], Vec::new(), Vec::new());
-    let mut last = 0;
-    for_each_entry(pattern, numbering.owned, matrix, |row, column, value| {
-        if row != last {
-            offsets.push(columns.len() as i32);
-            last = row;
-        }
-        let global = numbering.global[column / B] * B as i32 + (column % B) as i32;
-        columns.push(global);
-        let inside = numbers[row].is_some() && numbers[column].is_some();
-        values.push(if inside { value } else { f64::from(u8::from(row == column)) });
-    });
-    offsets.resize(rows + 1, columns.len() as i32);
-    let matrix = Matrix::from_csr(world.comm(), B, rows, &offsets, &columns, &values)?;
-    let (mut right, mut left) = (matrix.vector()?, matrix.vector()?);
-    for (dof, value) in right.values_mut()?.iter_mut().enumerate() {
-        *value = if free[dof] { noise(numbering.offset * B + dof) } else { 0.0 };
-    }
-    let mut ksp = Ksp::new(world.comm(), "kappa_")?;
-    ksp.set_defaults(&[
-        ("ksp_type", "cg"),
-        ("pc_type", "none"),
-        ("ksp_rtol", "1e-10"),
-        ("ksp_max_it", "5000"),
-    ])?;
-    ksp.set_compute_singular_values()?;
-    ksp.set_from_options()?;
-    ksp.set_operators(&matrix)?;
-    ksp.solve(&right, &mut left)?;
-    let (smallest, largest) = ksp.extreme_singular_values()?;
-    Ok(Extremes { smallest, largest })
-}
-
-/// Largest eigenvalue of K x = lambda M x (Ghost §3.5) by Lanczos' method in the inner product
-/// of M, to ten digits. Collective.
-pub fn largest_generalised<const D: usize>(
-    world: &World,
-    numbering: &Numbering,
-    pattern: &Pattern,
-    stiffness: &BlockMatrix<D>,
-    mass: &mut MassInverse<'_, D>,
-    free: &[bool],
-) -> Result<f64> {
-    let owned = numbering.owned * D;
-    let zero = vec![0.0; numbering.len() * D];
-    let dot = |a: &[f64], b: &[f64]| -> f64 {
-        world.sum(a.iter().zip(b).take(owned).map(|(a, b)| a * b).sum())
-    };
-    let mut weighted: Vec<f64> = (0..owned)
-        .map(|dof| if free[dof] { noise(numbering.offset * D + dof) } else { 0.0 })
-        .collect();
-    let mut weighted_before = vec![0.0; owned];
-    let mut vector = mass.solve(&weighted, &zero)?;
-    let mut norm = dot(&vector, &weighted).sqrt();
-    if !(norm > 0.0) {
-        return Ok(0.0);
-    }
-    let (mut diagonal, mut side) = (Vec::new(), Vec::new());
-    let mut found = 0.0;
-    for step in 0..MOST_STEPS {
-        for value in vector.iter_mut().chain(&mut weighted) {
-            *value /= norm;
-        }
-        let mut next = vec![0.0; owned];
-        for_each_entry(pattern, numbering.owned, stiffness, |row, column, value| {
-            next[row] += value * vector[column];
-        });
-        for (value, free) in next.iter_mut().zip(free) {
-            *value *= f64::from(u8::from(*free));
-        }
-        let alpha = dot(&next, &vector);
-        for dof in 0..owned {
-            next[dof] -=
-                alpha * weighted[dof] + norm * weighted_before[dof] * f64::from(u8::from(step > 0));
-        }
-        diagonal.push(alpha);
-        let now = largest_of_tridiagonal(&diagonal, &side);
-        let settled = step > 4 && (now - found).abs() <= 1e-11 * now.abs();
-        found = now;
-        vector = mass.solve(&next, &zero)?;
-        norm = dot(&vector, &next).max(0.0).sqrt();
-        if settled || !(norm > 1e-13 * found.abs()) {
-            break;
-        }
-        side.push(norm);
-        weighted_before = std::mem::replace(&mut weighted, next);
-    }
-    Ok(found)
 }
 
 /// By bisection on the sign count of the shifted factorisation.

@@ -302,7 +302,16 @@ fn solve_step<const D: usize>(
         Err(why) => return Ok(Err(why)),
     };
     let grid_after = moved_grid.as_ref().unwrap_or(&model.grid);
-    if let Some(why) = update::reason_to_refuse(world, grid_after, points, &made) {
+    let unsound = update::unsound_step(
+        world,
+        [&model.grid, grid_after],
+        deck.method.basis,
+        numbering,
+        &displacement,
+        points,
+        &made,
+    );
+    if let Some(why) = unsound {
         return Ok(Err(why));
     }
 

@@ -203,13 +203,9 @@ fn solve_step<const D: usize>(
         Err(why) => return Ok(Err(why)),
     };
     let grid_after = moved_grid.as_ref().unwrap_or(&model.grid);
-    if let Some(why) = update::reason_to_refuse(world, grid_after, points, &made) {
-        return Ok(Err(why));
-    }
-    let unsound = update::unsound_domain(
+    let unsound = update::unsound_step(
         world,
-        &model.grid,
-        grid_after,
+        [&model.grid, grid_after],
         deck.method.basis,
         numbering,
         &displacement,

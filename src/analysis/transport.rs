@@ -18,9 +18,10 @@
 //!   u = M~^-1 Σ m S^T v_p° of the points with that share, v_p° = α v_p + (1 - α) S v, as else
 //!   nothing bounded keeps the moment.
 //!
-//! The lumped mass keeps no angular momentum, and w = v' there.
+//! The lumped mass keeps no angular momentum, and w = v' there, as wherever the deck asks for the
+//! published motion.
 
-use crate::deck::model::StressUpdate;
+use crate::deck::model::{PositionUpdate, StressUpdate};
 
 /// What carries the points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,9 +38,15 @@ pub enum Carrier {
 
 /// The rule above. `consistent`: the kind of mass; `ghost`: it has a Ghost share on some rank;
 /// `share`: of FLIP.
-pub fn carrier(update: StressUpdate, consistent: bool, ghost: bool, share: f64) -> Carrier {
+pub fn carrier(
+    motion: PositionUpdate,
+    update: StressUpdate,
+    consistent: bool,
+    ghost: bool,
+    share: f64,
+) -> Carrier {
     match (update, ghost) {
-        _ if !consistent => Carrier::Updated,
+        _ if motion == PositionUpdate::Published || !consistent => Carrier::Updated,
         (StressUpdate::Usf, true) => Carrier::RemappedBack,
         (StressUpdate::Usf, false) => Carrier::Start,
         (_, true) if share > 0.0 => Carrier::Remapped,

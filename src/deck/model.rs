@@ -83,6 +83,7 @@ pub struct Method {
     pub frame: Frame,
     pub mass: Mass,
     pub stress_update: StressUpdate,
+    pub position_update: PositionUpdate,
     /// FLIP share: 1 is FLIP, 0 is PIC.
     pub flip: f64,
     /// `velocity_update = "xpic"` with `xpic_order = m`; `None` otherwise.
@@ -130,6 +131,15 @@ pub enum StressUpdate {
     Usf,
     Usl,
     Musl,
+}
+
+/// What moves the points of an explicit step with a Ghost mass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PositionUpdate {
+    /// The velocity that keeps the angular momentum.
+    Momentum,
+    /// The updated nodal velocity (Ghost eq. 9).
+    Published,
 }
 
 /// Ghost stabilisation parameters. Absolute values win over factors.

@@ -119,6 +119,7 @@ fn analysis(w: &mut Writer, deck: &Deck) {
     w.line("method", "frame", quote(m.frame.name()));
     w.line("method", "mass", quote(m.mass.name()));
     w.line("method", "stress_update", quote(m.stress_update.name()));
+    w.line("method", "position_update", quote(m.position_update.name()));
     let velocity = match (m.xpic, m.flip) {
         (Some(_), _) => quote("xpic"),
         (None, 1.0) => quote("flip"),

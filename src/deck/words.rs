@@ -2,7 +2,7 @@
 
 use super::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
-    InvertedIterates, Mass, OnFailure, StressUpdate, VerifyNorm,
+    InvertedIterates, Mass, OnFailure, PositionUpdate, StressUpdate, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -51,6 +51,7 @@ words! {
     Frame { "previous" => Previous, "updated" => Updated, "total" => Total }
     Mass { "consistent" => Consistent, "lumped" => Lumped }
     StressUpdate { "usf" => Usf, "usl" => Usl, "musl" => Musl }
+    PositionUpdate { "momentum" => Momentum, "published" => Published }
     GhostScaling { "scale-free" => ScaleFree, "literal" => Literal, "published" => Published }
     Element { "quad4" => Quad4, "tri3" => Tri3, "hex8" => Hex8, "tet4" => Tet4 }
     Initial { "balanced" => Balanced, "slabs" => Slabs }

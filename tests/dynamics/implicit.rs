@@ -1,5 +1,6 @@
 //! Newmark's method and its dissipative relative on a vibrating bar.
 
+use super::blocks::blocks;
 use super::ghosts::contact;
 use crate::common::run::{Results, Run};
 
@@ -111,8 +112,7 @@ fn cpdi2_works_in_implicit_dynamics() {
         let rate = (pair[0] / pair[1]).log2();
         assert!((1.8..2.3).contains(&rate), "{errors:?}");
     }
-    let fall = cpdi2(Run::text(FALL)).results();
-    assert!(fall.verify("displacement_error") < 1e-12);
+    assert!(cpdi2(fall()).results().verify("displacement_error") < 1e-12);
 
     let collision = cpdi2(contact(10))
         .set("analysis.type=\"implicit-dynamic\"")
@@ -131,45 +131,24 @@ fn cpdi2_works_in_implicit_dynamics() {
 #[test]
 fn a_step_response_starts_with_the_acceleration_of_the_load() {
     // Free fall from rest is exact from the first step on.
-    let run = Run::text(FALL).results();
+    let run = fall().results();
     assert!(run.verify("displacement_error") < 1e-12);
     let work = *run.history("work_external").last().unwrap();
     let kinetic = *run.history("energy_kinetic").last().unwrap();
     assert!((work / kinetic - 1.0).abs() < 1e-9, "{work} {kinetic}");
 }
 
-const FALL: &str = r#"
-title = "Fall"
-[analysis]
-type = "implicit-dynamic"
-steps = 5
-duration = 0.5
-[method]
-basis = "gimp"
-domain_update = "stretch"
-[ghost]
-mass_factor = 0.25
-stiffness_factor = 0.1
-[grid]
-type = "lattice"
-size = [4, 5]
-h = 0.5
-[material.soft]
-model = "hencky"
-young = 1000
-poisson = 0.3
-[[body]]
-name = "block"
-material = "soft"
-density = 10
-shape = { disc = { centre = [2, 3.6], radius = 0.8 } }
-[[load]]
-gravity = [0, -10]
-[[verify]]
-name = "displacement_error"
-field = "displacement"
-exact = ["0", "-5*t^2"]
-norm = "max"
-[output]
-every = 100
-"#;
+/// A disc that falls from rest, half a second in five steps.
+fn fall() -> Run {
+    blocks(&["shape = { disc = { centre = [2, 3.6], radius = 0.8 } }"])
+        .set("analysis={ type = \"implicit-dynamic\", steps = 5, duration = 0.5 }")
+        .set("method={ basis = \"gimp\", domain_update = \"stretch\" }")
+        .set("ghost={ mass_factor = 0.25, stiffness_factor = 0.1 }")
+        .set("grid.size=[4, 5]")
+        .set("grid.h=0.5")
+        .set("load=[{ gravity = [0, -10] }]")
+        .set(
+            "verify=[{ name = \"displacement_error\", field = \"displacement\", \
+             exact = [\"0\", \"-5*t^2\"], norm = \"max\" }]",
+        )
+}

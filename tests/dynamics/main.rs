@@ -7,6 +7,7 @@ mod common;
 #[path = "../common/program.rs"]
 mod program;
 
+mod blocks;
 mod conditioning;
 mod conservation;
 mod faults;
@@ -19,3 +20,5 @@ mod restart;
 mod space;
 mod stretch;
 mod table_3;
+mod table_3_masses;
+mod table_3_shapes;

@@ -9,7 +9,7 @@ use super::{POSITIVE, Section, at_least, between, key};
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
-    InvertedIterates, Mass, OnFailure, StressUpdate, VerifyNorm,
+    InvertedIterates, Mass, OnFailure, PositionUpdate, StressUpdate, VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -84,8 +84,10 @@ pub const SECTIONS: &[Section] = &[
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
                 "State in which equilibrium is written (Lagrangian §3-5)."),
             key("mass", Choice(Mass::NAMES), Default("\"consistent\""), "Mass matrix (dynamics)."),
-            key("stress_update", Choice(StressUpdate::NAMES), Default("\"usl\""),
-                "When stress is updated in an explicit step: first, last, or last with remapped velocity."),
+            key("stress_update", Choice(StressUpdate::NAMES), Default("\"musl\""),
+                "When stress is updated in an explicit step: first, last, or last with remapped velocity (musl). usl dissipates."),
+            key("position_update", Choice(PositionUpdate::NAMES), Default("\"momentum\""),
+                "What moves the points of an explicit step with the consistent mass: the velocity that keeps the angular momentum, or the updated nodal velocity (published: Ghost eq. 9)."),
             key("velocity_update", Special("\"flip\", \"pic\", \"xpic\", or a number from 0 (pic) to 1 (flip)"),
                 Default("\"flip\""), "How points take their velocity from the grid (explicit)."),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),

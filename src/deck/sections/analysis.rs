@@ -104,6 +104,7 @@ pub fn method(
     let frame = table.choice("frame");
     let mass = table.choice("mass");
     let stress_update = table.choice("stress_update");
+    let position_update = table.choice("position_update");
     let velocity = velocity_update(table);
     let order = table.count_if("xpic_order");
     let drop_below = table.number_if("drop_below");
@@ -132,6 +133,7 @@ pub fn method(
         frame: frame?,
         mass,
         stress_update: stress_update?,
+        position_update: position_update?,
         flip,
         xpic: xpic.then(|| order.unwrap_or(2)),
         drop_below: drop_below?.unwrap_or(if keeps_all { 0.0 } else { 1e-8 }),
