@@ -106,7 +106,8 @@ fn a_partition_may_cut_domains() {
             assert!(world.sum_usize(cut) > 0, "no domain is cut: the test shows nothing");
 
             let step = Discretisation::new(&world, &model, &points).unwrap();
-            let owned = &step.node_weight[..step.numbering.owned];
+            let weights = step.node_weights(&world).unwrap();
+            let owned = &weights[..step.numbering.owned];
             let total = world.sum(owned.iter().sum());
             let count = world.sum_usize(points.len()) as f64;
             assert!((total / count - 1.0).abs() < 1e-12, "weights add up to one for each point");
