@@ -66,6 +66,7 @@ impl Linear {
         let list: &[(&str, &str)] = match self {
             Linear::DirectOnOne if self.gathers(ranks) => &[
                 ("ksp_type", "preonly"),
+                ("ksp_rtol", "1e-8"),
                 ("pc_type", "telescope"),
                 ("telescope_ksp_type", "preonly"),
                 ("telescope_pc_type", "lu"),
@@ -74,6 +75,8 @@ impl Linear {
             ],
             Linear::DirectOnOne | Linear::Direct => &[
                 ("ksp_type", "preonly"),
+                // Of a method that the user puts in its place.
+                ("ksp_rtol", "1e-8"),
                 ("pc_type", "lu"),
                 ("pc_factor_mat_solver_type", PACKAGE),
                 ("snes_lag_preconditioner", "1"),
