@@ -306,6 +306,162 @@ fn newton_solves_and_stops_together() {
     });
 }
 
+/// x_i^3 + (T x)_i = n of the tridiagonal T: rows are coupled, and conjugate gradients need many
+/// iterations.
+struct Chain<'a> {
+    comm: &'a SimpleCommunicator,
+    own: std::ops::Range<usize>,
+    n: usize,
+    product: (Matrix, Vector, Vector),
+    /// |b| of each linear solve, and the errors of the iterates.
+    norms: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+/// Largest residual that is enough.
+const ENOUGH: f64 = 1e-9;
+
+impl NewtonProblem for Chain<'_> {
+    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+        let (matrix, place, product) = &mut self.product;
+        place.values_mut()?.copy_from_slice(x);
+        matrix.mult(place, product)?;
+        for ((f, x), t) in f.iter_mut().zip(x).zip(product.values()?.iter()) {
+            *f = x.powi(3) + t - self.n as f64;
+        }
+        Ok(true)
+    }
+
+    fn jacobian(&mut self, x: &[f64], matrix: &mut Matrix) -> Result<()> {
+        let mut values = Vec::new();
+        for (row, x) in self.own.clone().zip(x) {
+            values.extend(tridiagonal(&(row..row + 1), self.n, 3.0 * x * x).2);
+        }
+        matrix.update(&values)
+    }
+
+    fn before_solve(&mut self, rhs: &mut [f64]) -> Result<()> {
+        self.norms.push(norm(self.comm, rhs));
+        Ok(())
+    }
+
+    fn assess(&mut self, _iteration: usize, _x: &[f64], f: &[f64]) -> Result<Verdict> {
+        let error = norm(self.comm, f);
+        self.errors.push(error);
+        Ok(if error < ENOUGH { Verdict::Converged } else { Verdict::Continue })
+    }
+
+    fn excess(&self) -> f64 {
+        self.errors.last().unwrap() / ENOUGH
+    }
+}
+
+fn norm(comm: &SimpleCommunicator, values: &[f64]) -> f64 {
+    let mut vector = Vector::new(comm, values.len(), 1).unwrap();
+    vector.values_mut().unwrap().copy_from_slice(values);
+    vector.norm().unwrap()
+}
+
+#[test]
+fn linear_tolerances_follow_the_nonlinear_residual() {
+    const NAME: &str = "linear_tolerances_follow_the_nonlinear_residual";
+    on_ranks(NAME, &[1, 2, 4], |universe| {
+        // What a user would give, each under a prefix of its own.
+        let table = [
+            ("b_ksp_rtol", "1e-10"),
+            ("c_snes_ksp_ew_gamma", "0.5"),
+            ("c_snes_ksp_ew_alpha", "1.5"),
+            ("c_snes_ksp_ew_rtol0", "0.2"),
+            ("c_snes_ksp_ew_rtolmax", "0.4"),
+            ("c_snes_ksp_ew_threshold", "0.05"),
+            ("d_snes_ksp_ew", "false"),
+            ("e_ksp_rtol", "1e-6"),
+            ("e_snes_ksp_ew", "true"),
+            ("f_snes_ksp_ew_version", "3"),
+            ("g_pc_type", "lu"),
+            ("g_ksp_type", "preonly"),
+        ]
+        .map(|(name, value)| (name.to_string(), value.to_string()));
+        let session = Session::start(universe, &table, &[]).unwrap();
+        let world = universe.world();
+        let n = 200;
+        let own = share(&world, n, 1);
+        let (offsets, columns, values) = tridiagonal(&own, n, 0.0);
+        let new = || Matrix::from_csr(&world, 1, own.len(), &offsets, &columns, &values).unwrap();
+        let solver = |prefix: &str| -> Result<Snes> {
+            let mut snes = Snes::new(&world, prefix, 30)?;
+            let package = if world.size() > 1 { "mumps" } else { "petsc" };
+            snes.set_defaults(&[
+                ("ksp_type", "cg"),
+                ("ksp_rtol", "1e-10"),
+                ("ksp_max_it", "1000"),
+                ("pc_type", "jacobi"),
+                ("pc_factor_mat_solver_type", package),
+            ])?;
+            snes.set_from_options()?;
+            Ok(snes)
+        };
+        let solve = |prefix: &str| {
+            let mut snes = solver(prefix).unwrap();
+            let linear = new();
+            let product = (linear.vector().unwrap(), linear.vector().unwrap());
+            let product = (linear, product.0, product.1);
+            let (norms, errors) = (vec![], vec![]);
+            let own = own.clone();
+            let mut problem = Chain { comm: &world, own, n, product, norms, errors };
+            let mut a = new();
+            a.set_symmetric(true).unwrap();
+            let mut x = a.vector().unwrap();
+            x.set(60.0).unwrap();
+            let outcome = snes.solve(&mut problem, &mut a, &mut x).unwrap();
+            assert!(outcome.converged && outcome.linear_tolerances.len() == outcome.iterations);
+            (outcome, problem.norms, problem.errors, x)
+        };
+        let follows =
+            |prefix: &str, smallest: f64, [first, largest, gamma, alpha, kept]: [f64; 5]| {
+                let (outcome, norms, errors, x) = solve(prefix);
+                let mut before = None;
+                for (k, &eta) in outcome.linear_tolerances.iter().enumerate() {
+                    let expected = match before {
+                        None => first,
+                        Some(eta) => {
+                            let rule = gamma * (norms[k] / norms[k - 1]).powf(alpha);
+                            let old: f64 = gamma * f64::powf(eta, alpha);
+                            let rule = if old > kept { rule.max(old) } else { rule };
+                            rule.max(1e-2 * ENOUGH / errors[k]).min(largest).max(smallest)
+                        }
+                    };
+                    assert!((eta / expected - 1.0).abs() < 1e-10, "{prefix} {k}: {eta} {expected}");
+                    before = Some(eta);
+                }
+                (outcome, x)
+            };
+        let (fixed, _, _, exact) = solve("b_");
+        assert!(fixed.linear_tolerances.iter().all(|&eta| eta == 1e-10));
+        let defaults = [1e-3, 1e-3, 1e-2, 2.0, 0.1];
+        let (forced, mut x) = follows("a_", 1e-10, defaults);
+        assert_eq!(forced.iterations, fixed.iterations);
+        let (few, many) = (forced.linear_iterations_total, fixed.linear_iterations_total);
+        assert!(2 * few < many, "{few} iterations instead of {many}");
+        assert!(forced.linear_tolerances.iter().any(|&eta| eta < 1e-4));
+        x.axpy(-1.0, &exact).unwrap();
+        assert!(x.norm_max().unwrap() < ENOUGH);
+        let (own_rule, mut x) = follows("c_", 1e-10, [0.2, 0.4, 0.5, 1.5, 0.05]);
+        assert!(own_rule.linear_iterations_total < few);
+        x.axpy(-1.0, &exact).unwrap();
+        assert!(x.norm_max().unwrap() < ENOUGH);
+        follows("e_", 1e-6, defaults);
+        for prefix in ["d_", "g_"] {
+            let all = solve(prefix).0.linear_tolerances;
+            assert!(all.iter().all(|&eta| eta == all[0]), "{prefix}: {all:?}");
+        }
+        let refused = solver("f_").map(|_| ()).unwrap_err();
+        assert!(matches!(refused, Error::Input(_)), "{refused}");
+        assert!(refused.to_string().contains("-f_snes_ksp_ew_version 3"), "{refused}");
+        assert!(session.unused_options().unwrap().is_empty());
+    });
+}
+
 #[test]
 fn later_options_win() {
     let folder = tempfile::tempdir().unwrap();

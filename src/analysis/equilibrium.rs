@@ -414,6 +414,10 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
             Verdict::Continue
         })
     }
+
+    fn excess(&self) -> f64 {
+        self.errors.last().map_or(f64::INFINITY, |error| error / self.settings.tolerance)
+    }
 }
 
 /// The faces' share of a scalar matrix, `weight(face) * J_G`; `None` if it vanishes everywhere.

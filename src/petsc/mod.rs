@@ -11,12 +11,14 @@
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
 //! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
+//! | `forcing.rs` | [`Forcing`]: how well each linear solve of Newton's method is worth doing |
 //! | `log.rs` | [`log::Phase`]: stages seen by `-log_view` |
 //!
 //! Every constructor and every method that talks to a communicator is collective. Objects that
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
 mod check;
+mod forcing;
 pub mod known;
 pub mod ksp;
 pub mod log;
@@ -28,6 +30,7 @@ pub mod sys;
 pub mod vector;
 
 pub use check::agree;
+pub use forcing::Forcing;
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
 pub use session::{Session, abort_all, version};

@@ -33,6 +33,11 @@ pub fn is_set(name: &str) -> Result<bool> {
     Ok(all()?.split_whitespace().any(|word| word.eq_ignore_ascii_case(&name)))
 }
 
+/// Is the option set, and not by [`set_default`]? Asking does not count as reading it.
+pub fn is_users(name: &str) -> Result<bool> {
+    Ok(!built_in(|names| names.contains(&dashed(name))) && is_set(name)?)
+}
+
 /// Is any option set that starts like this? Asking does not count as reading it.
 pub fn any_set(prefix: &str) -> Result<bool> {
     let prefix = dashed(prefix);

@@ -12,6 +12,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
 use super::check::{agree, c_text, petsc, require_running, running, text_of};
+use super::forcing::{self, Forcing};
 use super::ksp;
 use super::vector::{Values, ValuesMut, index};
 use super::{Ksp, Matrix, Vector, sys};
@@ -47,6 +48,12 @@ pub trait NewtonProblem {
     /// be evaluated. `Converged` at iteration 0 is taken as `Continue`: at least one solve.
     /// `Converged` counts only if all ranks say so.
     fn assess(&mut self, iteration: usize, x: &[f64], f: &[f64]) -> Result<Verdict>;
+
+    /// Error of the iterate assessed last over the error that is enough: an iterative linear
+    /// solver need not reduce it by much more. Infinite: unknown. The same on all ranks.
+    fn excess(&self) -> f64 {
+        f64::INFINITY
+    }
 }
 
 /// How a nonlinear solve ended.
@@ -56,6 +63,8 @@ pub struct NewtonOutcome {
     pub iterations: usize,
     pub linear_iterations_total: usize,
     pub linear_iterations_max: usize,
+    /// Relative tolerance of each linear solve.
+    pub linear_tolerances: Vec<f64>,
     pub converged: bool,
     /// It ended because a linear solve failed.
     pub linear_failure: bool,
@@ -70,6 +79,8 @@ pub struct Snes {
     prefix: String,
     /// Matrix of the last solve.
     matrix: u64,
+    /// Tolerances of an iterative linear solver, unless one is fixed.
+    forcing: Option<Forcing>,
 }
 
 /// What the callbacks see during one solve.
@@ -77,6 +88,7 @@ struct Context<'a, P> {
     problem: &'a mut P,
     matrix: &'a mut Matrix,
     comm: &'a SimpleCommunicator,
+    forcing: Option<Forcing>,
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
@@ -85,17 +97,20 @@ struct Context<'a, P> {
     linear_solves: usize,
     linear_total: usize,
     linear_max: usize,
+    linear_tolerances: Vec<f64>,
     linear_failure: Option<String>,
 }
 
 impl Snes {
     /// Newton's method with full steps (`-<prefix>snes_linesearch_type bt` for backtracking) and
     /// at most `max_solves` linear solves per call of [`Self::solve`]. `prefix` without the dash;
-    /// it serves the linear solver too. Eisenstat-Walker forcing (`snes_ksp_ew`) has no effect.
+    /// it serves the linear solver too. An iterative one gets the tolerances of [`Forcing`]: fixed
+    /// if the user gives `-<prefix>ksp_rtol` or `-<prefix>snes_ksp_ew false`.
     pub fn new(comm: &SimpleCommunicator, prefix: &str, max_solves: usize) -> Result<Self> {
         require_running()?;
         let comm = comm.duplicate();
-        let mut snes = Snes { raw: null_mut(), comm, prefix: prefix.into(), matrix: 0 };
+        let mut snes =
+            Snes { raw: null_mut(), comm, prefix: prefix.into(), matrix: 0, forcing: None };
         petsc!(SNESCreate(snes.comm.as_raw(), &mut snes.raw))?;
         let prefix = c_text(prefix)?;
         petsc!(SNESSetOptionsPrefix(snes.raw, prefix.as_ptr()))?;
@@ -104,6 +119,7 @@ impl Snes {
         petsc!(SNESGetLineSearch(snes.raw, &mut search))?;
         petsc!(SNESLineSearchSetType(search, sys::SNESLINESEARCHBASIC.as_ptr().cast()))?;
         snes.set_max_solves(max_solves)?;
+        forcing::set_default(snes.raw)?;
         Ok(snes)
     }
 
@@ -126,7 +142,9 @@ impl Snes {
 
     /// Reads the options under the prefix, those of the linear solver included.
     pub fn set_from_options(&mut self) -> Result<()> {
-        petsc!(SNESSetFromOptions(self.raw))
+        petsc!(SNESSetFromOptions(self.raw))?;
+        self.forcing = forcing::chosen(self.raw, &self.prefix)?;
+        Ok(())
     }
 
     /// The linear solver inside: tolerances, reuse of the preconditioner, description.
@@ -154,12 +172,14 @@ impl Snes {
             problem,
             matrix,
             comm: &self.comm,
+            forcing: self.forcing.clone(),
             error: None,
             diverged: None,
             outside: false,
             linear_solves: 0,
             linear_total: 0,
             linear_max: 0,
+            linear_tolerances: Vec::new(),
             linear_failure: None,
         };
         // The callbacks get this pointer back while `SNESSolve` runs and at no other time.
@@ -199,6 +219,7 @@ impl Snes {
             iterations: context.linear_solves,
             linear_iterations_total: context.linear_total,
             linear_iterations_max: context.linear_max,
+            linear_tolerances: context.linear_tolerances,
             converged,
             linear_failure,
             reason,
@@ -285,7 +306,7 @@ unsafe extern "C" fn jacobian<P: NewtonProblem>(
 }
 
 unsafe extern "C" fn before_solve<P: NewtonProblem>(
-    _ksp: sys::KSP,
+    inner: sys::KSP,
     rhs: sys::Vec,
     _solution: sys::Vec,
     data: *mut c_void,
@@ -295,7 +316,13 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     // SAFETY: PETSc's vector lives through the call, and this hook may change it.
     let result =
         unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
-    context.settle(result, |_, ()| Ok(()))
+    context.settle(result, |context, ()| {
+        let Some(forcing) = &mut context.forcing else { return Ok(()) };
+        let (mut norm, default) = (0.0, f64::from(sys::PETSC_DEFAULT));
+        petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;
+        let eta = forcing.next(norm, context.problem.excess());
+        petsc!(KSPSetTolerances(inner, eta, default, default, sys::PETSC_DEFAULT))
+    })
 }
 
 unsafe extern "C" fn after_solve<P: NewtonProblem>(
@@ -307,6 +334,9 @@ unsafe extern "C" fn after_solve<P: NewtonProblem>(
     // SAFETY: as in `residual`.
     let context = unsafe { &mut *data.cast::<Context<P>>() };
     context.settle(ksp::outcome(inner), |context, outcome| {
+        let mut tolerance = 0.0;
+        petsc!(KSPGetTolerances(inner, &mut tolerance, null_mut(), null_mut(), null_mut()))?;
+        context.linear_tolerances.push(tolerance);
         context.linear_solves += 1;
         context.linear_total += outcome.iterations;
         context.linear_max = context.linear_max.max(outcome.iterations);

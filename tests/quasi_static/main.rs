@@ -9,4 +9,5 @@ mod collapse;
 mod column;
 mod equality;
 mod shear;
+mod snap;
 mod solid;
