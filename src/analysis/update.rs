@@ -11,7 +11,7 @@ use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::material::Material;
-use crate::mechanics::{self, StepStart};
+use crate::mechanics::{self, BATCH, StepStart, StressState};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::tensor::{self, Spectrum};
@@ -202,20 +202,24 @@ pub fn respond<const D: usize>(
     points: &mut Points<D>,
 ) -> PointEnergies {
     let mut sum = PointEnergies::default();
-    for (p, increment) in increments.iter().enumerate() {
-        let start = StepStart {
-            material: &materials[points.body[p] as usize],
-            deformation_gradient: &points.deformation_gradient[p],
-            elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
-            volume_initial: points.volume_initial[p],
+    let mut states = [StressState::default(); BATCH];
+    for (batch, increments) in increments.chunks(BATCH).enumerate() {
+        let first = batch * BATCH;
+        let start = |k: usize| StepStart {
+            material: &materials[points.body[first + k] as usize],
+            deformation_gradient: &points.deformation_gradient[first + k],
+            elastic_left_cauchy_green: &points.elastic_left_cauchy_green[first + k],
+            volume_initial: points.volume_initial[first + k],
         };
-        let state = mechanics::stress(&start, increment);
-        points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
-        points.kirchhoff_stress[p] = state.kirchhoff_stress;
-        points.plastic_strain[p] += state.plastic_increment;
-        points.dissipation[p] += state.dissipation;
-        sum.strain += state.stored_energy * points.volume_initial[p];
-        sum.plastic += points.dissipation[p] * points.volume_initial[p];
+        mechanics::stresses(start, increments, &mut states);
+        for (p, state) in (first..first + increments.len()).zip(&states) {
+            points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
+            points.kirchhoff_stress[p] = state.kirchhoff_stress;
+            points.plastic_strain[p] += state.plastic_increment;
+            points.dissipation[p] += state.dissipation;
+            sum.strain += state.stored_energy * points.volume_initial[p];
+            sum.plastic += points.dissipation[p] * points.volume_initial[p];
+        }
     }
     sum
 }

@@ -24,7 +24,7 @@ impl VonMises {
     #[inline(always)]
     pub fn respond(&self, trial: [f64; 3]) -> Response {
         let two_mu = 2.0 * self.elasticity.mu;
-        let mean = (trial[0] + trial[1] + trial[2]) / 3.0;
+        let mean = (trial[0] + trial[1] + trial[2]) * (1.0 / 3.0);
         let deviator = trial.map(|e| e - mean);
         let norm = deviator.iter().map(|e| e * e).sum::<f64>().sqrt();
         let radius = two_mu * norm;

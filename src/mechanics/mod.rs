@@ -20,6 +20,8 @@ mod paper_tests;
 #[cfg(test)]
 mod tests;
 
+pub use update::BATCH;
+
 use nalgebra::Matrix3;
 
 use crate::deck::model::Frame;
@@ -42,7 +44,7 @@ pub struct Contribution<const D: usize> {
 }
 
 /// What the constitutive update leaves at the point.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StressState {
     pub kirchhoff_stress: Matrix3<f64>,
     pub elastic_left_cauchy_green: Matrix3<f64>,
@@ -69,6 +71,16 @@ pub struct StepStart<'a> {
 #[inline]
 pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> StressState {
     update::update(start, increment).state(start.material)
+}
+
+/// [`stress`] of at most [`BATCH`] points at once, the same to the last bit: `start` gives the
+/// state of each before the step, `out` takes the one after it.
+pub fn stresses<'a, const D: usize>(
+    start: impl Fn(usize) -> StepStart<'a>,
+    increments: &[[[f64; D]; D]],
+    out: &mut [StressState],
+) {
+    update::states(start, increments, out);
 }
 
 /// Stress and tangent in `frame` for the increment dF = 1 + d(du)/dX~ (Lagrangian eq. 7).

@@ -4,7 +4,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{Contribution, StepStart, StressState, contribution, stress};
+use super::{BATCH, Contribution, StepStart, StressState, contribution, stress, stresses};
 use crate::deck::model::Frame;
 use crate::material::{Hencky, Material, VonMises};
 use crate::tensor::dense::{self, Square};
@@ -371,4 +371,26 @@ fn singular_increments_show() {
         let case = Case::unstrained(plastic(), [[1.0, f64::NAN], [0.0, 1.0]]);
         assert!(case.contribution(frame).0.stress.iter().flatten().any(|t| !t.is_finite()));
     }
+}
+
+#[test]
+fn a_batch_gives_each_point_what_it_gets_alone() {
+    fn check<const D: usize>() {
+        for count in [1, 7, BATCH] {
+            let material = |k: usize| if k % 3 == 0 { elastic() } else { plastic() };
+            let cases: Vec<Case<D>> =
+                (0..count).map(|k| Case::random(material(k), k as u64, 0.02 * k as f64)).collect();
+            let increments: Vec<Square<D>> = cases.iter().map(|case| case.increment).collect();
+            let mut states = [StressState::default(); BATCH];
+            stresses(|k| cases[k].start(), &increments, &mut states);
+            for (case, state) in cases.iter().zip(&states) {
+                assert_eq!(*state, stress(&case.start(), &case.increment));
+            }
+            let flows =
+                states[..count].iter().filter(|state| state.plastic_increment > 0.0).count();
+            assert!(count < 7 || (flows > 0 && flows < count), "both kinds: {flows} of {count}");
+        }
+    }
+    check::<2>();
+    check::<3>();
 }

@@ -139,14 +139,19 @@ pub fn logarithm_slope(a: f64, b: f64, ln_a: f64, ln_b: f64) -> f64 {
 }
 
 /// Jacobi rotation of [[p, q], [q, r]]: the values of the axes (c, -s) and (s, c), and c, s.
+///
+/// With d = (r - p)/2 and R = sqrt(d^2 + q^2): tan = q sign(d) / (|d| + R) and
+/// cos^2 = (1 + |d|/R) / 2, whose roots and quotients hardly wait for each other.
 #[inline]
 fn rotate(p: f64, r: f64, q: f64) -> ([f64; 2], f64, f64) {
-    if q == 0.0 {
+    let d = 0.5 * (r - p);
+    let root = (d * d + q * q).sqrt();
+    // Also where the squares are too small for a number: then so is q beside any p and r.
+    if q == 0.0 || root == 0.0 {
         return ([p, r], 1.0, 0.0);
     }
-    let theta = (r - p) / (2.0 * q);
-    let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-    let c = 1.0 / (t * t + 1.0).sqrt();
+    let t = q.copysign(q * d) / (d.abs() + root);
+    let c = (0.5 + 0.5 * (d.abs() / root)).sqrt();
     ([p - t * q, r + t * q], c, t * c)
 }
 
