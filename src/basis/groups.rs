@@ -25,9 +25,8 @@ impl Groups {
         let count = influences.len();
         let mut groups = Groups { node_offsets: vec![0], ..Groups::default() };
         groups.group_of_point.reserve(count);
-        // Ends and length say nearly all (on a lattice: all) about a row; rows that share them
-        // but differ inside are chained.
-        let mut first_with: FxHashMap<[usize; 3], usize> =
+        // Few rows share their first node; those that do are chained.
+        let mut first_with: FxHashMap<usize, usize> =
             FxHashMap::with_capacity_and_hasher(count / 4, Default::default());
         let mut next_with: Vec<Option<usize>> = Vec::new();
         let mut sizes: Vec<usize> = Vec::new();
@@ -38,8 +37,7 @@ impl Groups {
             let group = match before.filter(|&g| same(groups.nodes(g), row)) {
                 Some(same) => same,
                 None => {
-                    let ends = |i: Option<&usize>| i.copied().unwrap_or(usize::MAX);
-                    let key = [ends(row.first()), ends(row.last()), row.len()];
+                    let key = row.first().copied().unwrap_or(usize::MAX);
                     let head = first_with.get(&key).copied();
                     let mut found = head;
                     while let Some(g) = found.filter(|&g| !same(groups.nodes(g), row)) {
