@@ -21,8 +21,15 @@ fn main() {
         beam();
     }
     if wanted("pairs") {
-        pairs("2D gimp, 8 steps", &["grid.h=0.02", "analysis.steps=8"]);
-        pairs("3D gimp, 2 steps", &block_3d(30).iter().map(String::as_str).collect::<Vec<_>>());
+        pairs("2D gimp, 8 steps", "scaling", &["grid.h=0.02", "analysis.steps=8"]);
+        let block = block_3d(30);
+        let block: Vec<&str> = block.iter().map(String::as_str).collect();
+        pairs("3D gimp, 2 steps", "scaling", &block);
+        for basis in ["mpm", "cpdi2"] {
+            let basis = format!("method.basis=\"{basis}\"");
+            let name = format!("mesh of quadrilaterals, {basis}, 4 steps");
+            pairs(&name, "doughnut-10", &[&MESH[..], &[&basis]].concat());
+        }
     }
     if wanted("memory") {
         memory();
@@ -111,6 +118,17 @@ fn beam() {
     );
 }
 
+/// `inputs/doughnut-10.toml` on a finer mesh: 184 000 points, multigrid on any number of ranks.
+const MESH: [&str; 7] = [
+    "grid.generate.annulus.radial=80",
+    "grid.generate.annulus.around=576",
+    "analysis.steps=4",
+    "petsc.qs_ksp_type=\"cg\"",
+    "petsc.qs_ksp_rtol=1e-8",
+    "petsc.qs_pc_type=\"gamg\"",
+    "petsc.qs_pc_gamg_threshold=0.02",
+];
+
 /// The block of `inputs/scaling.toml` as a cube of `cells` a side.
 fn block_3d(cells: usize) -> Vec<String> {
     let h = 1.0 / cells as f64;
@@ -131,8 +149,8 @@ fn block_3d(cells: usize) -> Vec<String> {
 
 /// Two ranks beside one and beside two independent copies, in turn. The copies share nothing but
 /// the machine: twice the time of one alone over theirs is the most that two ranks can gain.
-fn pairs(name: &str, sets: &[&str]) {
-    let deck = input("scaling.toml");
+fn pairs(name: &str, deck: &str, sets: &[&str]) {
+    let deck = input(&format!("{deck}.toml"));
     let (mut runs, mut copies) = ([Vec::new(), Vec::new()], Vec::new());
     for _ in 0..REPEATS {
         for ranks in [1, 2] {
