@@ -377,7 +377,7 @@ fn singular_increments_show() {
 fn a_batch_gives_each_point_what_it_gets_alone() {
     fn check<const D: usize>() {
         for count in [1, 7, BATCH] {
-            let material = |k: usize| if k % 3 == 0 { elastic() } else { plastic() };
+            let material = |k: usize| if k.is_multiple_of(3) { elastic() } else { plastic() };
             let cases: Vec<Case<D>> =
                 (0..count).map(|k| Case::random(material(k), k as u64, 0.02 * k as f64)).collect();
             let increments: Vec<Square<D>> = cases.iter().map(|case| case.increment).collect();
