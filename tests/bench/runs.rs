@@ -1,6 +1,6 @@
 //! Whole runs of the program: the §7.3 beam, two ranks beside one, memory per point and node.
 //!
-//! `cargo bench --bench runs [-- beam|pairs|memory ...]`. Wall times: on a machine that is busy
+//! `cargo bench --bench runs [-- beam|pairs|mesh|memory ...]`. Wall times: on a machine that is busy
 //! they say little; the load is printed beside them.
 
 mod report;
@@ -25,6 +25,8 @@ fn main() {
         let block = block_3d(30);
         let block: Vec<&str> = block.iter().map(String::as_str).collect();
         pairs("3D gimp, 2 steps", "scaling", &block);
+    }
+    if wanted("mesh") {
         for basis in ["mpm", "cpdi2"] {
             let basis = format!("method.basis=\"{basis}\"");
             let name = format!("mesh of quadrilaterals, {basis}, 4 steps");
