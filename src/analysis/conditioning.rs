@@ -14,7 +14,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::{self};
+use super::balance;
 use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};

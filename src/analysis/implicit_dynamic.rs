@@ -22,12 +22,13 @@ use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::{Equilibrium, Inertia};
 use super::grid_mass::GridMass;
 use super::ledger::{Entry, Ledger, StepSums};
+use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
 use super::time_step::stability_limit;
-use super::{mapping, motion, newton, update};
+use super::{mapping, newton, update};
 
 /// Runs all time steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -295,25 +296,11 @@ fn solve_step<const D: usize>(
     };
     let displacement = solved.displacement;
 
-    let made = update::increments(step, &displacement);
-    let moved_grid = match motion::moved(world, deck, &model.grid, numbering, &displacement, span)?
-    {
-        Ok(moved_grid) => moved_grid,
+    let carried = match newton::carried(world, model, &mesh, points, &displacement, span)? {
+        Ok(carried) => carried,
         Err(why) => return Ok(Err(why)),
     };
-    let grid_after = moved_grid.as_ref().unwrap_or(&model.grid);
-    let unsound = update::unsound_step(
-        world,
-        [&model.grid, grid_after],
-        deck.method.basis,
-        numbering,
-        &displacement,
-        points,
-        &made,
-    );
-    if let Some(why) = unsound {
-        return Ok(Err(why));
-    }
+    let Carried { made, moved_grid } = carried;
 
     let (mut end_acceleration, mut end_velocity) = (at_rest.clone(), at_rest);
     for dof in 0..nodes * D {

@@ -1,8 +1,10 @@
 //! One step's equations handed to Newton's method, and what comes back: the part that implicit
 //! analyses share.
 
+use crate::assembly::conditions::StepSpan;
 use crate::deck::model::Basis;
 use crate::error::Result;
+use crate::grid::Grid;
 use crate::parallel::{World, traffic};
 use crate::petsc::log::Phase;
 use crate::petsc::snes::NewtonOutcome;
@@ -12,8 +14,10 @@ use crate::points::Points;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, NewtonSettings};
+use super::motion;
 use super::recorder::Recorder;
 use super::solver::{self, Linear};
+use super::update::{self, Increments};
 
 /// A converged step. Vectors without other mention hold the owned degrees of freedom.
 pub struct Converged {
@@ -99,6 +103,42 @@ pub fn solve<const D: usize>(
         evaluations: problem.errors.len(),
         linear_iterations: outcome.linear_iterations_total,
     }))
+}
+
+/// What a converged step does to points and grid, not yet applied.
+pub struct Carried<const D: usize> {
+    pub made: Increments<D>,
+    /// `None` where the grid does not move.
+    pub moved_grid: Option<Grid<D>>,
+}
+
+/// What the step's nodal `displacement` (local nodes, m) makes of points and grid. The inner `Err`
+/// says why it cannot be applied, the same on every rank: a cell that would turn over, an unsound
+/// point, an unsound domain. Collective.
+pub fn carried<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    displacement: &[f64],
+    span: StepSpan,
+) -> Result<std::result::Result<Carried<D>, String>> {
+    let (deck, grid, numbering) = (&model.deck, &model.grid, &mesh.numbering);
+    let made = update::increments(mesh.step_points(points, &model.materials), displacement);
+    let moved_grid = match motion::moved(world, deck, grid, numbering, displacement, span)? {
+        Ok(moved_grid) => moved_grid,
+        Err(why) => return Ok(Err(why)),
+    };
+    let after = moved_grid.as_ref().unwrap_or(grid);
+    let basis = deck.method.basis;
+    let unsound = update::reason_to_refuse(world, after, points, &made).or_else(|| {
+        let grids = [grid, after];
+        update::unsound_domain(world, grids, basis, numbering, displacement, points, &made)
+    });
+    Ok(match unsound {
+        Some(why) => Err(why),
+        None => Ok(Carried { made, moved_grid }),
+    })
 }
 
 /// Newton's method with the default solver; where that fails, once more from the start with the

@@ -19,10 +19,11 @@ use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
+use super::newton::Carried;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
 use super::stepping::Stepping;
-use super::{motion, newton, update, verify};
+use super::{newton, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -196,25 +197,11 @@ fn solve_step<const D: usize>(
     };
     let (displacement, internal) = (solved.displacement, solved.internal);
 
-    let made = update::increments(step, &displacement);
-    let moved_grid = match motion::moved(world, deck, &model.grid, numbering, &displacement, span)?
-    {
-        Ok(moved_grid) => moved_grid,
+    let carried = match newton::carried(world, model, &mesh, points, &displacement, span)? {
+        Ok(carried) => carried,
         Err(why) => return Ok(Err(why)),
     };
-    let grid_after = moved_grid.as_ref().unwrap_or(&model.grid);
-    let unsound = update::unsound_step(
-        world,
-        [&model.grid, grid_after],
-        deck.method.basis,
-        numbering,
-        &displacement,
-        points,
-        &made,
-    );
-    if let Some(why) = unsound {
-        return Ok(Err(why));
-    }
+    let Carried { made, moved_grid } = carried;
     let work = work_of_step::<D>(
         &conditions,
         numbering,

@@ -100,24 +100,9 @@ pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
     ))
 }
 
-/// Says why an implicit step cannot be applied, if so: what [`reason_to_refuse`] finds, then a
-/// CPDI domain that it would turn over or carry out of `after`, the grid of the next step.
-/// `displacement`: local nodes, m. The answer is the same on every rank. Collective.
-pub fn unsound_step<const D: usize>(
-    world: &World,
-    [grid, after]: [&Grid<D>; 2],
-    basis: Basis,
-    numbering: &Numbering,
-    displacement: &[f64],
-    points: &Points<D>,
-    increments: &Increments<D>,
-) -> Option<String> {
-    reason_to_refuse(world, after, points, increments).or_else(|| {
-        unsound_domain(world, [grid, after], basis, numbering, displacement, points, increments)
-    })
-}
-
-fn unsound_domain<const D: usize>(
+/// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
+/// step, if any. `displacement`: local nodes, m. Collective.
+pub fn unsound_domain<const D: usize>(
     world: &World,
     [grid, after]: [&Grid<D>; 2],
     basis: Basis,

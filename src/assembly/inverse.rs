@@ -119,7 +119,14 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                 self.iterations += iterations;
                 x.into_flattened()
             }
-            _ => self.solve_directly(prepared.b)?,
+            Method::Direct(factors, which) => {
+                let mut b = prepared.b;
+                for (k, &factor) in which.iter().enumerate() {
+                    factors[factor].solve(&mut b, D, k);
+                }
+                b
+            }
+            Method::Petsc(_) => self.by_petsc(&prepared.b)?,
         };
         self.complete(solution, prepared.x)
     }
@@ -204,16 +211,6 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             preconditioner: &start.preconditioner,
             inverse_row_sum: &start.inverse_row_sum,
         }
-    }
-
-    fn solve_directly(&mut self, mut b: Vec<f64>) -> Result<Vec<f64>> {
-        if let Method::Direct(factors, which) = &self.method {
-            for (k, &factor) in which.iter().enumerate() {
-                factors[factor].solve(&mut b, D, k);
-            }
-            return Ok(b);
-        }
-        self.by_petsc(&b)
     }
 
     fn by_petsc(&mut self, b: &[f64]) -> Result<Vec<f64>> {

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use crate::parallel::World;
 
 use super::incomplete::Incomplete;
-use super::{BlockMatrix, Numbering, Pattern};
+use super::{BlockMatrix, Numbering, Pattern, mass};
 
 /// Relative residual of the iteration, in the norm of the preconditioner.
 const TOLERANCE: f64 = 1e-14;
@@ -136,21 +136,13 @@ impl Iteration<'_> {
         free: &[[bool; C]],
         product: &mut [[f64; C]],
     ) -> [f64; C] {
+        let (flat, out) = (x.as_flattened(), product.as_flattened_mut());
+        mass::multiply::<C>(self.matrix, self.pattern, flat, out);
         let mut products = [0.0; C];
-        let rows = self.pattern.offsets.windows(2);
-        for (row, ((out, free), range)) in product.iter_mut().zip(free).zip(rows).enumerate() {
-            let mut sum = [0.0; C];
-            let range = range[0]..range[1];
-            let columns = &self.pattern.columns[range.clone()];
-            for (&column, value) in columns.iter().zip(&self.matrix.values[range]) {
-                let x = &x[column as usize];
-                for k in 0..C {
-                    sum[k] += value * x[k];
-                }
-            }
+        for ((out, free), x) in product.iter_mut().zip(free).zip(x) {
             for k in 0..C {
-                out[k] = if free[k] { sum[k] } else { 0.0 };
-                products[k] += out[k] * x[row][k];
+                out[k] = if free[k] { out[k] } else { 0.0 };
+                products[k] += out[k] * x[k];
             }
         }
         products

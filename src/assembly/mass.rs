@@ -57,15 +57,18 @@ pub fn multiply<const D: usize>(
     x: &[f64],
     y: &mut [f64],
 ) {
-    for (row, out) in y.chunks_exact_mut(D).enumerate() {
+    let (x, _) = x.as_chunks::<D>();
+    let (y, _) = y.as_chunks_mut::<D>();
+    for (out, range) in y.iter_mut().zip(pattern.offsets.windows(2)) {
+        let range = range[0]..range[1];
         let mut sum = [0.0; D];
-        for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
-            let (value, column) = (matrix.values[entry], pattern.columns[entry] as usize);
-            for (s, x) in sum.iter_mut().zip(&x[column * D..column * D + D]) {
-                *s += value * x;
+        for (&column, value) in pattern.columns[range.clone()].iter().zip(&matrix.values[range]) {
+            let x = &x[column as usize];
+            for k in 0..D {
+                sum[k] += value * x[k];
             }
         }
-        out.copy_from_slice(&sum);
+        *out = sum;
     }
 }
 

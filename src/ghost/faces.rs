@@ -3,12 +3,13 @@
 //! (Ghost §3.1, §4.2). Found for each body alone, then united.
 //!
 //! The penalty bounds the condition only if a path of such faces leads from every cell to a well
-//! filled one (E. Burman, "Ghost penalty", Comptes Rendus Mathematique 348 (2010) 1217-1220). Points leave triangles and tetrahedra empty between populated ones
-//! far more often than the paper's quadrilaterals, and a cell behind such a gap would hang on by
-//! nodes alone. So an empty simplex between two populated cells is a *bridge*: its faces to them
-//! are boundary faces, too. Two faces hold all nodes of a simplex, so this adds no equation, and a
-//! linear field still has no jump. Where two or more empty simplices lie between them the cells
-//! are tied directly ([`super::ties`]). Quadrilaterals and hexahedra stay with the paper's rule.
+//! filled one (E. Burman, "Ghost penalty", Comptes Rendus Mathematique 348 (2010) 1217-1220).
+//! Points leave triangles and tetrahedra empty between populated ones far more often than the paper's
+//! quadrilaterals, and a cell behind such a gap would hang on by nodes alone. So an empty simplex
+//! between two populated cells is a *bridge*: its faces to them are boundary faces, too. Two faces
+//! hold all nodes of a simplex, so this adds no equation, and a linear field still has no jump.
+//! Where two or more empty simplices lie between them the cells are tied directly
+//! ([`super::ties`]). Quadrilaterals and hexahedra stay with the paper's rule.
 
 use rustc_hash::FxHashMap;
 

@@ -9,9 +9,9 @@ use crate::grid::Grid;
 use crate::points::Points;
 use crate::points::sort::sort_by_cell;
 
-/// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns how many changed rank,
-/// over all ranks. Collective. Error, the same on all ranks: a point outside the grid; no point
-/// has been moved then.
+/// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns
+/// how many changed rank, over all ranks. Collective. Error, the same on all ranks: a point outside
+/// the grid; no point has been moved then.
 pub fn migrate<const D: usize>(
     world: &World,
     partition: &Partition<D>,
