@@ -1,48 +1,96 @@
 //! P = L L^T ~ M on the sparsity of M (Cholesky without fill): the preconditioner of the mass.
 //!
 //! The mass is well conditioned but for cut cells, whose few small values the factor takes up.
-//! Couplings to nodes of other ranks are left out. It serves lattices and meshes alike.
+//! It serves lattices and meshes alike. One factor spans all ranks (Hysom and Pothen, SIAM J. Sci.
+//! Comput. 22 (2001) 2194): each rank eliminates its inner nodes first, which meet no node of
+//! another rank, all ranks at once; then the nodes on the border, rank after rank in an order that
+//! keeps the chains of ranks that wait for each other short. So no coupling is left out, and the
+//! iterations hardly depend on the number of ranks.
 
-use super::{BlockMatrix, Pattern};
+use std::ops::Range;
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::error::Result;
+use crate::parallel::World;
+use crate::parallel::exchange::{receive_list, send_lists};
+
+use super::{BlockMatrix, Numbering, Pattern};
 
 /// A row whose pivot would fall below this share of its diagonal entry stands alone instead.
 const LEAST_PIVOT: f64 = 1e-3;
 
 /// The factor of one rank's rows.
 pub struct Incomplete {
-    /// Below the diagonal, row r is `starts[r]..starts[r + 1]` of `columns` and `values`.
-    starts: Vec<u32>,
+    here: u32,
+    /// Owned nodes in the order of elimination.
+    order: Vec<u32>,
+    /// The first so many of them are inner nodes.
+    inner: usize,
+    /// Below the diagonal, the row of local node n is `rows[n]` of `columns` (local nodes, in the
+    /// order of elimination) and `values`. Ghosts have what the elimination needs of their rows.
+    rows: Vec<[u32; 2]>,
     columns: Vec<u32>,
     values: Vec<f64>,
-    /// One over the diagonal of L; zero in rows without mass.
+    /// One over the diagonal of L, per local node; zero in rows without mass.
     inverse_diagonal: Vec<f64>,
+}
+
+/// A rank tells of a row of L first its diagonal, then the entries beyond the inner nodes.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Told {
+    /// Of the column; [`Told::ROW`] where a row begins.
+    node: u64,
+    /// Entry of L; one over its diagonal where a row begins.
+    value: f64,
+}
+
+impl Told {
+    const ROW: u64 = u64::MAX;
+}
+
+/// Ranks take their turns on the border in the order of their reversed bits: neighbours mostly
+/// have neighbouring numbers, and so half of all ranks wait for nobody.
+fn turn(rank: usize) -> u32 {
+    (rank as u32).reverse_bits()
 }
 
 impl Incomplete {
     /// `diagonal`: of the owned rows of `matrix`, not negative; rows where it is zero are left
-    /// out.
-    pub fn factor(matrix: &BlockMatrix<1>, pattern: &Pattern, diagonal: &[f64]) -> Self {
-        let rows = diagonal.len();
-        let entries = pattern.ghost_start / 2;
-        let mut factor = Incomplete {
-            starts: Vec::with_capacity(rows + 1),
-            columns: Vec::with_capacity(entries),
-            values: Vec::with_capacity(entries),
-            inverse_diagonal: Vec::with_capacity(rows),
-        };
-        factor.starts.push(0);
+    /// out. Collective.
+    pub fn factor(
+        world: &World,
+        matrix: &BlockMatrix<1>,
+        numbering: &Numbering,
+        pattern: &Pattern,
+        diagonal: &[f64],
+    ) -> Self {
+        let here = turn(world.rank());
+        let mut factor = Incomplete::plan(here, numbering, pattern);
+        let places = factor.places(numbering);
         // The row being made, spread out over all columns.
-        let mut spread = vec![0.0; rows];
-        for row in 0..rows {
+        let mut spread = vec![0.0; numbering.len()];
+        let mut sorted = Vec::new();
+        for at in 0..factor.order.len() {
+            if at == factor.inner {
+                factor.hear(world, numbering);
+            }
+            let row = factor.order[at] as usize;
             let begin = factor.columns.len();
             if diagonal[row] > 0.0 {
-                for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
-                    let column = pattern.columns[entry];
-                    if (column as usize) < row && diagonal[column as usize] > 0.0 {
-                        factor.columns.push(column);
-                        factor.values.push(matrix.values[entry]);
-                    }
+                let entries = pattern.offsets[row]..pattern.offsets[row + 1];
+                let earlier = entries.filter(|&entry| {
+                    let column = pattern.columns[entry] as usize;
+                    places[column] < places[row] && factor.inverse_diagonal[column] > 0.0
+                });
+                sorted.clear();
+                sorted.extend(earlier);
+                if at >= factor.inner {
+                    sorted.sort_unstable_by_key(|&entry| places[pattern.columns[entry] as usize]);
                 }
+                factor.columns.extend(sorted.iter().map(|&entry| pattern.columns[entry]));
+                factor.values.extend(sorted.iter().map(|&entry| matrix.values[entry]));
             }
             let pivot = diagonal[row] - factor.eliminate(begin, &mut spread);
             let sound = pivot > LEAST_PIVOT * diagonal[row];
@@ -51,10 +99,51 @@ impl Incomplete {
                 factor.values.truncate(begin);
             }
             let pivot = if sound { pivot } else { diagonal[row] };
-            factor.inverse_diagonal.push(if pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 });
-            factor.starts.push(factor.columns.len() as u32);
+            factor.inverse_diagonal[row] = if pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
+            factor.rows[row] = [begin as u32, factor.columns.len() as u32];
         }
+        if factor.inner == factor.order.len() {
+            factor.hear(world, numbering);
+        }
+        factor.tell(world, numbering, &places);
         factor
+    }
+
+    /// The order of elimination, without any entry.
+    fn plan(here: u32, numbering: &Numbering, pattern: &Pattern) -> Self {
+        let owned = numbering.owned;
+        let on_border = |&node: &u32| {
+            let row = pattern.offsets[node as usize]..pattern.offsets[node as usize + 1];
+            pattern.columns[row].iter().any(|&column| column as usize >= owned)
+        };
+        let (border, mut order): (Vec<u32>, Vec<u32>) = (0..owned as u32).partition(on_border);
+        let inner = order.len();
+        order.extend(border);
+        let entries = pattern.ghost_start / 2;
+        Incomplete {
+            here,
+            order,
+            inner,
+            rows: vec![[0; 2]; numbering.len()],
+            columns: Vec::with_capacity(entries),
+            values: Vec::with_capacity(entries),
+            inverse_diagonal: vec![0.0; numbering.len()],
+        }
+    }
+
+    /// Where each local node stands in the elimination; those of later ranks never come.
+    fn places(&self, numbering: &Numbering) -> Vec<u32> {
+        let mut places = vec![u32::MAX; numbering.len()];
+        let (inner, border) = self.order.split_at(self.inner);
+        let mut earlier: Vec<(usize, Range<usize>)> =
+            numbering.halo.ghosts().filter(|(rank, _)| turn(*rank) < self.here).collect();
+        earlier.sort_unstable_by_key(|(rank, _)| turn(*rank));
+        let ghosts = earlier.into_iter().flat_map(|(_, ghosts)| ghosts);
+        let nodes = |part: &[u32]| part.to_vec().into_iter().map(|node| node as usize);
+        for (place, node) in nodes(inner).chain(ghosts).chain(nodes(border)).enumerate() {
+            places[node] = place as u32;
+        }
+        places
     }
 
     /// Turns the entries from `begin` on, those of the newest row of M, into that row of L;
@@ -63,7 +152,7 @@ impl Incomplete {
         let mut squares = 0.0;
         for at in begin..self.columns.len() {
             let column = self.columns[at] as usize;
-            let range = self.starts[column] as usize..self.starts[column + 1] as usize;
+            let range = self.row(column);
             let mut value = self.values[at];
             for (&other, l) in self.columns[range.clone()].iter().zip(&self.values[range]) {
                 value -= spread[other as usize] * l;
@@ -79,43 +168,126 @@ impl Incomplete {
         squares
     }
 
+    /// Waits for the rows of ghosts that come before the border of this rank.
+    fn hear(&mut self, world: &World, numbering: &Numbering) {
+        for (rank, ghosts) in numbering.halo.ghosts().filter(|(rank, _)| turn(*rank) < self.here) {
+            let mut told = receive_list::<Told>(world, rank).into_iter().peekable();
+            for ghost in ghosts {
+                let Some(start) = told.next() else { break };
+                self.inverse_diagonal[ghost] = start.value;
+                let begin = self.columns.len() as u32;
+                while let Some(entry) = told.next_if(|entry| entry.node != Told::ROW) {
+                    if let Some(column) = numbering.local(entry.node as usize) {
+                        self.columns.push(column as u32);
+                        self.values.push(entry.value);
+                    }
+                }
+                self.rows[ghost] = [begin, self.columns.len() as u32];
+            }
+        }
+    }
+
+    /// Sends the rows of copied nodes to the ranks whose border comes later.
+    fn tell(&self, world: &World, numbering: &Numbering, places: &[u32]) {
+        let mut lists = Vec::new();
+        for (rank, copied) in numbering.halo.copies().filter(|(rank, _)| turn(*rank) > self.here) {
+            let mut told = Vec::new();
+            for &node in copied {
+                told.push(Told { node: Told::ROW, value: self.inverse_diagonal[node as usize] });
+                for entry in self.row(node as usize) {
+                    let column = self.columns[entry] as usize;
+                    // Inner nodes meet no node of the other rank.
+                    if places[column] as usize >= self.inner {
+                        let node = numbering.nodes[column] as u64;
+                        told.push(Told { node, value: self.values[entry] });
+                    }
+                }
+            }
+            lists.push((rank, told));
+        }
+        send_lists(world, &lists);
+    }
+
+    #[inline]
+    fn row(&self, node: usize) -> Range<usize> {
+        let [begin, end] = self.rows[node];
+        begin as usize..end as usize
+    }
+
     /// z = P^-1 r where `free`, else zero, for `C` right-hand sides side by side; returns r·z of
-    /// each over this rank's rows.
+    /// each over this rank's rows. `z` is local, its ghosts are left undefined. Collective over
+    /// neighbours.
     pub fn apply<const C: usize>(
         &self,
+        world: &World,
+        numbering: &Numbering,
         r: &[[f64; C]],
         free: &[[bool; C]],
         z: &mut [[f64; C]],
-    ) -> [f64; C] {
-        let row_of = |row: usize| self.starts[row] as usize..self.starts[row + 1] as usize;
-        for (row, right) in r.iter().enumerate() {
-            let mut sum = *right;
-            for (&column, l) in self.columns[row_of(row)].iter().zip(&self.values[row_of(row)]) {
+    ) -> Result<[f64; C]> {
+        let (inner, border) = self.order.split_at(self.inner);
+        let owned = self.order.len();
+        let before = |rank: usize| turn(rank) < self.here;
+        let after = |rank: usize| turn(rank) > self.here;
+        let nobody = |_: usize| false;
+        let halo = &numbering.halo;
+        self.forward(inner, r, z);
+        halo.forward_among(world, z.as_flattened_mut(), C, before, nobody)?;
+        self.forward(border, r, z);
+        halo.forward_among(world, z.as_flattened_mut(), C, nobody, after)?;
+        // From here on the ghosts collect what their owners are to add.
+        z[owned..].fill([0.0; C]);
+        halo.reverse_add_among(world, z.as_flattened_mut(), C, after, nobody)?;
+        let mut products = [0.0; C];
+        self.backward(border, r, free, z, &mut products);
+        halo.reverse_add_among(world, z.as_flattened_mut(), C, nobody, before)?;
+        self.backward(inner, r, free, z, &mut products);
+        Ok(products)
+    }
+
+    /// L z = r in the rows `nodes`.
+    fn forward<const C: usize>(&self, nodes: &[u32], r: &[[f64; C]], z: &mut [[f64; C]]) {
+        for &node in nodes {
+            let node = node as usize;
+            let mut sum = r[node];
+            let row = self.row(node);
+            for (&column, l) in self.columns[row.clone()].iter().zip(&self.values[row]) {
                 let solved = &z[column as usize];
                 for k in 0..C {
                     sum[k] -= l * solved[k];
                 }
             }
-            let weight = self.inverse_diagonal[row];
-            z[row] = sum.map(|sum| sum * weight);
+            let weight = self.inverse_diagonal[node];
+            z[node] = sum.map(|sum| sum * weight);
         }
-        let mut products = [0.0; C];
-        for (row, (right, free)) in r.iter().zip(free).enumerate().rev() {
-            let weight = self.inverse_diagonal[row];
-            let solved = z[row].map(|z| z * weight);
-            for (&column, l) in self.columns[row_of(row)].iter().zip(&self.values[row_of(row)]) {
+    }
+
+    /// L^T z = z in the rows `nodes`, last first; adds r·z to `products`.
+    fn backward<const C: usize>(
+        &self,
+        nodes: &[u32],
+        r: &[[f64; C]],
+        free: &[[bool; C]],
+        z: &mut [[f64; C]],
+        products: &mut [f64; C],
+    ) {
+        for &node in nodes.iter().rev() {
+            let node = node as usize;
+            let weight = self.inverse_diagonal[node];
+            let solved = z[node].map(|z| z * weight);
+            let row = self.row(node);
+            for (&column, l) in self.columns[row.clone()].iter().zip(&self.values[row]) {
                 let target = &mut z[column as usize];
                 for k in 0..C {
                     target[k] -= l * solved[k];
                 }
             }
-            // Later rows have taken this value already: it can be masked.
+            // The rows that need this value have taken it: it can be masked.
             for k in 0..C {
-                z[row][k] = if free[k] { solved[k] } else { 0.0 };
-                products[k] += right[k] * z[row][k];
+                z[node][k] = if free[node][k] { solved[k] } else { 0.0 };
+                products[k] += r[node][k] * z[node][k];
             }
         }
-        products
     }
 }
 

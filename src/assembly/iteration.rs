@@ -42,8 +42,8 @@ impl Iteration<'_> {
             let sums = world.sum_slice(&sums);
             std::array::from_fn(|k| sums[k])
         };
-        let precondition = |r: &[[f64; C]], z: &mut [[f64; C]]| -> [f64; C] {
-            all(self.preconditioner.apply(r, free, z))
+        let precondition = |r: &[[f64; C]], z: &mut [[f64; C]]| -> Result<[f64; C]> {
+            Ok(all(self.preconditioner.apply(world, self.numbering, r, free, z)?))
         };
         // Local: the product reads ghosts.
         let mut p = vec![[0.0; C]; self.numbering.len()];
@@ -62,9 +62,9 @@ impl Iteration<'_> {
         let mut r: Vec<[f64; C]> =
             b.iter().zip(&product).map(|(b, p)| std::array::from_fn(|k| b[k] - p[k])).collect();
         p.fill([0.0; C]);
-        let mut z = vec![[0.0; C]; owned];
-        let whole = precondition(b, &mut z);
-        let mut size = precondition(&r, &mut z);
+        let mut z = vec![[0.0; C]; self.numbering.len()];
+        let whole = precondition(b, &mut z)?;
+        let mut size = precondition(&r, &mut z)?;
         // Accelerations of nearly empty nodes are no place to start from.
         let restart: [bool; C] = std::array::from_fn(|k| !(size[k] < whole[k]));
         if restart.contains(&true) {
@@ -73,7 +73,7 @@ impl Iteration<'_> {
                     (x[row][k], r[row][k]) = (0.0, b[row][k]);
                 }
             }
-            size = precondition(&r, &mut z);
+            size = precondition(&r, &mut z)?;
         }
         let mut factor = [0.0; C];
         let mut iteration = 0;
@@ -94,7 +94,7 @@ impl Iteration<'_> {
                      stabilise it ([ghost] mass_factor = 0.25) or use method.mass = \"lumped\""
                 )));
             }
-            for (p, z) in p.iter_mut().zip(&z) {
+            for (p, z) in p.iter_mut().zip(&z[..owned]) {
                 for k in 0..C {
                     p[k] = z[k] + factor[k] * p[k];
                 }
@@ -116,7 +116,7 @@ impl Iteration<'_> {
                     r[k] -= length[k] * product[k];
                 }
             }
-            let next = precondition(&r, &mut z);
+            let next = precondition(&r, &mut z)?;
             for k in 0..C {
                 factor[k] = if active[k] { next[k] / size[k] } else { 0.0 };
                 if active[k] {

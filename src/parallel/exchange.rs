@@ -12,6 +12,8 @@ use super::{World, traffic};
 
 /// Longer lists travel in several messages: MPI counts bytes in 32 bits.
 const LARGEST_MESSAGE: usize = 1 << 30;
+/// Of single lists; the halo uses 17, the sparse exchanges 100 and above.
+const LIST_TAG: i32 = 18;
 
 /// Sends each list to its rank and returns what arrived, in ascending order of the source.
 /// Empty lists are not sent; a list for oneself passes by; of several lists for one rank the
@@ -51,6 +53,36 @@ pub fn exchange_in_messages<T: Pod>(
     incoming.retain(|(_, list)| !list.is_empty());
     incoming.sort_by_key(|(source, _)| *source);
     Ok(incoming)
+}
+
+/// Sends lists to ranks that wait for them in [`receive_list`]; empty lists are sent too.
+pub fn send_lists<T: Pod>(world: &World, lists: &[(usize, Vec<T>)]) {
+    let comm = world.comm();
+    let send = || {
+        mpi::request::multiple_scope(lists.len(), |scope, requests| {
+            for (rank, list) in lists {
+                let bytes: &[u8] = bytemuck::cast_slice(list);
+                traffic::count_message(bytes.len());
+                let process = comm.process_at_rank(*rank as i32);
+                requests.add(process.immediate_send_with_tag(scope, bytes, LIST_TAG));
+            }
+            let mut done = Vec::with_capacity(lists.len());
+            requests.wait_all(&mut done);
+        })
+    };
+    if !lists.is_empty() {
+        traffic::waiting(send);
+    }
+}
+
+/// Waits for a list of unknown length from one rank.
+pub fn receive_list<T: Pod>(world: &World, rank: usize) -> Vec<T> {
+    let process = world.comm().process_at_rank(rank as i32);
+    let (bytes, _): (Vec<u8>, _) =
+        traffic::waiting(|| process.matched_probe_with_tag(LIST_TAG).matched_receive_vec());
+    let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
+    bytemuck::cast_slice_mut(&mut list).copy_from_slice(&bytes);
+    list
 }
 
 /// Adds to the list of `source`. Messages of one source arrive in the order they were sent.

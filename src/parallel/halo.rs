@@ -59,17 +59,33 @@ impl HaloPlan {
     /// Overwrites the ghosts with their owners' values; `block` values per entry. Collective
     /// over neighbours.
     pub fn forward(&self, world: &World, values: &mut [f64], block: usize) -> Result<()> {
+        self.forward_among(world, values, block, |_| true, |_| true)
+    }
+
+    /// [`Self::forward`] where only the owners `from` and the holders of copies `to` take part;
+    /// those on the other side must say the same.
+    pub fn forward_among(
+        &self,
+        world: &World,
+        values: &mut [f64],
+        block: usize,
+        from: impl Fn(usize) -> bool,
+        to: impl Fn(usize) -> bool,
+    ) -> Result<()> {
         let (owned, ghosts) = values.split_at_mut(self.owned * block);
         let packed: Vec<(usize, Vec<f64>)> = self
             .copies
             .iter()
+            .filter(|(rank, _)| to(*rank))
             .map(|(rank, locals)| (*rank, gather(owned, locals, block)))
             .collect();
         let mut slots = Vec::with_capacity(self.ghosts.len());
         let mut rest = ghosts;
         for (rank, range) in &self.ghosts {
             let (slot, tail) = rest.split_at_mut(range.len() * block);
-            slots.push((*rank, slot));
+            if from(*rank) {
+                slots.push((*rank, slot));
+            }
             rest = tail;
         }
         swap(world, &packed, slots);
@@ -79,21 +95,34 @@ impl HaloPlan {
     /// Adds the ghosts' values to their owners, neighbour by neighbour in ascending order of
     /// rank, so that sums repeat bit by bit. The ghosts keep their values.
     pub fn reverse_add(&self, world: &World, values: &mut [f64], block: usize) -> Result<()> {
+        self.reverse_add_among(world, values, block, |_| true, |_| true)
+    }
+
+    /// [`Self::reverse_add`] where only the holders of copies `from` and the owners `to` take
+    /// part; those on the other side must say the same.
+    pub fn reverse_add_among(
+        &self,
+        world: &World,
+        values: &mut [f64],
+        block: usize,
+        from: impl Fn(usize) -> bool,
+        to: impl Fn(usize) -> bool,
+    ) -> Result<()> {
         let packed: Vec<(usize, Vec<f64>)> = self
             .ghosts
             .iter()
+            .filter(|(rank, _)| to(*rank))
             .map(|(rank, range)| (*rank, values[range.start * block..range.end * block].to_vec()))
             .collect();
-        let mut received: Vec<Vec<f64>> =
-            self.copies.iter().map(|(_, locals)| vec![0.0; locals.len() * block]).collect();
-        let slots = self
+        let mut received: Vec<(usize, &[u32], Vec<f64>)> = self
             .copies
             .iter()
-            .zip(&mut received)
-            .map(|((rank, _), buffer)| (*rank, &mut buffer[..]))
+            .filter(|(rank, _)| from(*rank))
+            .map(|(rank, locals)| (*rank, &locals[..], vec![0.0; locals.len() * block]))
             .collect();
+        let slots = received.iter_mut().map(|(rank, _, buffer)| (*rank, &mut buffer[..])).collect();
         swap(world, &packed, slots);
-        for ((_, locals), buffer) in self.copies.iter().zip(&received) {
+        for (_, locals, buffer) in &received {
             for (&local, block_values) in locals.iter().zip(buffer.chunks_exact(block)) {
                 let start = local as usize * block;
                 for (value, add) in values[start..start + block].iter_mut().zip(block_values) {
@@ -102,6 +131,16 @@ impl HaloPlan {
             }
         }
         Ok(())
+    }
+
+    /// Ranks that hold copies, with the local indices of the owned values they copy; ascending.
+    pub fn copies(&self) -> impl Iterator<Item = (usize, &[u32])> {
+        self.copies.iter().map(|(rank, locals)| (*rank, &locals[..]))
+    }
+
+    /// Ranks that own ghosts, with the local indices of these; ascending.
+    pub fn ghosts(&self) -> impl Iterator<Item = (usize, std::ops::Range<usize>)> {
+        self.ghosts.iter().cloned()
     }
 
     /// Neighbour ranks this one sends owned values to.

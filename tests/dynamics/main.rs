@@ -14,6 +14,7 @@ mod faults;
 mod figure_14;
 mod ghosts;
 mod implicit;
+mod iterations;
 mod ranks;
 mod report;
 mod restart;
