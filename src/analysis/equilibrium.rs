@@ -298,11 +298,11 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         Ok(usable)
     }
 
-    /// Whether the coming iterate will hardly need a tangent: should Newton's method converge
-    /// quadratically, its error is below the tolerance.
+    /// Whether the coming iterate will hardly need a tangent: its error is below the tolerance if
+    /// it falls by as much as the last one did. Newton's method mostly does better.
     fn expects_convergence(&self) -> bool {
         let [.., before, last] = self.errors[..] else { return false };
-        last * (last / before).powi(2) <= self.settings.tolerance
+        last * (last / before) <= self.settings.tolerance
     }
 
     /// f_react = f_int(old) + K (x - x_old) - f_ext on the fixed degrees of freedom.
