@@ -1,4 +1,5 @@
-//! The assembled system on one to four ranks: tiled against plain, and against its own parts.
+//! The assembled system on one to four ranks: tiled against plain, against its own parts, and what
+//! the solver multiplies with against the plain sums with the conditions put in.
 
 mod common;
 
@@ -8,13 +9,18 @@ use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
 use mpm_par::analysis::discretise::{Discretisation, Model};
-use mpm_par::analysis::setup;
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, add_scalar, ghost_matrix};
+use mpm_par::analysis::{setup, solver};
+use mpm_par::assembly::conditions::{Conditions, StepSpan};
 use mpm_par::assembly::internal::{self, StepPoints};
 use mpm_par::assembly::{BlockMatrix, plain};
 use mpm_par::deck;
 use mpm_par::deck::model::Frame;
 use mpm_par::error::Result;
 use mpm_par::parallel::{World, migrate};
+use mpm_par::petsc::Session;
+use mpm_par::petsc::snes::NewtonProblem;
+use mpm_par::points::Points;
 
 /// A block of material whose points lie off the middles of the cells, `per_cell` of them a side.
 fn deck_text(dimension: usize, basis: &str, per_cell: usize, plastic: bool) -> String {
@@ -47,12 +53,13 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())) / size.max(f64::MIN_POSITIVE)
 }
 
-fn compare<const D: usize>(
+/// The block with its points off the middles of the cells.
+fn block<const D: usize>(
     world: &World,
     basis: &str,
     per_cell: usize,
     plastic: bool,
-) -> Result<()> {
+) -> Result<(Model<D>, Points<D>)> {
     let text = deck_text(D, basis, per_cell, plastic);
     let deck = deck::read(Path::new("block.toml"), &text, &[])?;
     let (model, mut points): (Model<D>, _) = setup::prepare(world, deck)?;
@@ -62,16 +69,31 @@ fn compare<const D: usize>(
         }
     }
     migrate(world, &model.partition, &model.grid, &mut points)?;
-    let mesh = Discretisation::new(world, &model, &points)?;
-    let numbering = &mesh.numbering;
-    let displacement: Vec<f64> = numbering
+    Ok((model, points))
+}
+
+/// Smooth displacements of the local nodes.
+fn field<const D: usize>(model: &Model<D>, mesh: &Discretisation<D>) -> Vec<f64> {
+    mesh.numbering
         .nodes
         .iter()
         .flat_map(|&node| {
             let x = model.grid.node_position(node);
             std::array::from_fn::<f64, D, _>(|i| 0.04 * x[i] + 0.03 * (x[(i + 1) % D]).sin())
         })
-        .collect();
+        .collect()
+}
+
+fn compare<const D: usize>(
+    world: &World,
+    basis: &str,
+    per_cell: usize,
+    plastic: bool,
+) -> Result<()> {
+    let (model, points) = block::<D>(world, basis, per_cell, plastic)?;
+    let mesh = Discretisation::new(world, &model, &points)?;
+    let numbering = &mesh.numbering;
+    let displacement = field(&model, &mesh);
     let step = StepPoints {
         points: &points,
         materials: &model.materials,
@@ -125,6 +147,114 @@ fn compare<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// What the solver's matrix makes of a vector, against plain sums into whole rows, Ghost stiffness
+/// and conditions included.
+fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
+    let (model, points) = block::<D>(world, basis, 2, false)?;
+    let span = StepSpan { factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 0.0 };
+    let mesh = Discretisation::new(world, &model, &points)?;
+    let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+    let deck = &model.deck;
+    let boundaries = &deck.boundaries;
+    let basis_of = deck.method.basis;
+    let conditions =
+        Conditions::evaluate(world, &model.grid, basis_of, numbering, &points, boundaries, span)?;
+    let left_out = mesh.nodes_left_out(world, 1e-2);
+    let held: Vec<bool> =
+        (0..numbering.len() * D).map(|dof| conditions.fixed[dof] || left_out[dof / D]).collect();
+    assert!(world.any(held.contains(&true)) && world.any(held.contains(&false)));
+    let displacement = field(&model, &mesh);
+    let frame = Frame::Previous;
+    let step = mesh.step_points(&points, &model.materials);
+
+    let mut rows = BlockMatrix::<D>::zeros(pattern);
+    let mut force = vec![0.0; numbering.len() * D];
+    plain::assemble(step, frame, numbering, pattern, &displacement, &mut force, &mut rows);
+    rows.reduce(world, pattern)?;
+    let ghost = ghost_matrix(world, &mesh, |face| face.stiffness)?.expect("faces are stabilised");
+    add_scalar(&ghost, pattern, &mut rows);
+    // A vector that tells columns apart, and the rows times it.
+    let probe: Vec<f64> = numbering
+        .global
+        .iter()
+        .flat_map(|&node| {
+            std::array::from_fn::<f64, D, _>(|i| (node as f64 + 0.3 * i as f64).sin())
+        })
+        .collect();
+    let owned = numbering.owned * D;
+    let (mut products, mut diagonals, mut free) = (vec![0.0; owned], 0.0, 0);
+    for dof in (0..owned).filter(|&dof| !held[dof]) {
+        let range = pattern.offsets[dof / D]..pattern.offsets[dof / D + 1];
+        let start = D * D * range.start + dof % D * range.len() * D;
+        for (position, &node) in pattern.columns[range].iter().enumerate() {
+            for k in 0..D {
+                let (column, value) =
+                    (node as usize * D + k, rows.values[start + position * D + k]);
+                if column == dof {
+                    diagonals += value.abs();
+                    free += 1;
+                }
+                if !held[column] {
+                    products[dof] += value * probe[column];
+                }
+            }
+        }
+    }
+    let scale = world.sum(diagonals) / world.sum_usize(free) as f64;
+    for dof in (0..owned).filter(|&dof| held[dof]) {
+        products[dof] = scale * probe[dof];
+    }
+
+    let settings = NewtonSettings {
+        tolerance: 1e-9,
+        max_evaluations: 10,
+        frame,
+        inverted: deck.analysis.inverted_iterates,
+    };
+    let external = vec![0.0; owned];
+    let mut problem =
+        Equilibrium::new(world, &mesh, step, &conditions, &left_out, external, settings)?;
+    let values = vec![0.0; pattern.ghost_start * D * D];
+    let mut matrix = solver::matrix(world, &model.grid, numbering, pattern, &values)?;
+    let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);
+    x.values_mut()?.copy_from_slice(&probe[..owned]);
+    let iterate = &displacement[..owned];
+    let mut residual = vec![0.0; owned];
+    assert!(problem.residual_and_matrix(iterate, &mut residual, &mut matrix)?);
+    problem.jacobian(iterate, &mut matrix)?;
+    matrix.mult(&x, &mut y)?;
+    let first = y.values()?.to_vec();
+    let largest = world.max(products.iter().fold(0.0, |m: f64, v| m.max(v.abs())));
+    for (dof, (made, wanted)) in first.iter().zip(&products).enumerate() {
+        assert!((made - wanted).abs() < 1e-13 * largest, "{dof}: {made:e}, {wanted:e}");
+    }
+
+    // The tangent made after the residual is the same to the last bit, and so is a repeat.
+    let mut alone = vec![0.0; owned];
+    for _ in 0..2 {
+        assert!(problem.residual(iterate, &mut alone)?);
+        assert_eq!(alone, residual);
+        problem.jacobian(iterate, &mut matrix)?;
+        matrix.mult(&x, &mut y)?;
+        assert_eq!(y.values()?.to_vec(), first);
+    }
+    Ok(())
+}
+
+fn all_in_place(universe: &Universe) {
+    let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
+    let world = World::new(universe.world().duplicate());
+    for basis in ["mpm", "gimp"] {
+        in_place::<2>(&world, basis).expect("2D runs");
+        in_place::<3>(&world, basis).expect("3D runs");
+    }
+}
+
+#[test]
+fn the_solver_multiplies_with_the_plain_sums() {
+    on_ranks("the_solver_multiplies_with_the_plain_sums", &[1, 2, 3, 4], all_in_place);
 }
 
 fn all_cases(universe: &Universe) {

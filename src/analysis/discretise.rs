@@ -139,10 +139,17 @@ impl<const D: usize> Discretisation<D> {
             Coupling::Diagonal => Default::default(),
         };
 
-        let mut reached = groups.nodes.clone();
-        reached.extend(faces.iter().flat_map(|face| face.nodes.iter().copied()));
-        let owned_cells = populated.owned.iter().map(|(cell, _)| cell);
-        for &cell in populated.reached.iter().chain(owned_cells) {
+        let mut reached: Vec<usize> =
+            faces.iter().flat_map(|face| face.nodes.iter().copied()).collect();
+        // A point's nodes are those of the cells it populates; on a mesh, a point in a face may
+        // be found now in one of its cells and now in the other.
+        if matches!(grid, Grid::Mesh(_)) {
+            reached.extend_from_slice(&groups.nodes);
+        }
+        let of_others = populated.reached.iter().filter(|&&cell| {
+            world.size() > 1 && populated.owned.binary_search_by_key(&cell, |own| own.0).is_err()
+        });
+        for &cell in populated.owned.iter().map(|(cell, _)| cell).chain(of_others) {
             grid.cell_nodes(cell, &mut reached);
         }
         let touched = Touched::settle(world, grid, partition, reached)?;

@@ -7,7 +7,10 @@
 use std::time::Instant;
 
 use crate::assembly::conditions::Conditions;
+use crate::assembly::held::Held;
+use crate::assembly::in_place::{InPlace, Layout};
 use crate::assembly::internal::{self, Health, StepPoints};
+use crate::assembly::scatter::{self, BlockRows};
 use crate::assembly::{BlockMatrix, Numbering, Pattern};
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
@@ -37,15 +40,17 @@ pub struct Equilibrium<'a, const D: usize> {
     step: StepPoints<'a, D>,
     settings: NewtonSettings,
     /// Fixed by a condition, or left out (`drop_below`).
-    held: Vec<bool>,
+    held: Held,
     increment: Vec<f64>,
     external_owned: Vec<f64>,
     /// K_G: constant over the step.
-    ghost: Option<BlockMatrix<1>>,
+    ghost: Option<GhostTerm>,
     inertia: Option<Inertia>,
-    stiffness: BlockMatrix<D>,
-    /// Tangent rows of held degrees of freedom at the previous iterate.
-    held_rows: HeldRows,
+    layout: Layout<D>,
+    /// Rows that the solver's array cannot take whole.
+    beside: Vec<f64>,
+    /// What the matrix holds.
+    tangent: Tangent,
     displacement: Vec<f64>,
     previous_owned: Vec<f64>,
     internal_owned: Vec<f64>,
@@ -71,10 +76,21 @@ pub struct Inertia {
     pub matrix: BlockMatrix<1>,
 }
 
-#[derive(Default)]
-struct HeldRows {
-    rows: Vec<u32>,
-    values: Vec<f64>,
+/// K_G and which of its rows are not zero.
+struct GhostTerm {
+    matrix: BlockMatrix<1>,
+    reaches: Vec<bool>,
+}
+
+/// What the values of the matrix are, compared with the last evaluation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tangent {
+    /// Those of another iterate.
+    Stale,
+    /// Its tangent.
+    Assembled,
+    /// The same with the conditions in it: ready for the solver.
+    Constrained,
 }
 
 impl<'a, const D: usize> Equilibrium<'a, D> {
@@ -95,11 +111,17 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             held[local * D..(local + 1) * D].fill(true);
         }
         let owned = numbering.owned * D;
-        let held_rows = HeldRows {
-            rows: (0..owned).filter(|&dof| conditions.fixed[dof]).map(|d| d as u32).collect(),
-            values: Vec::new(),
-        };
-        let ghost = ghost_matrix(world, mesh, |face| face.stiffness)?;
+        let layout = Layout::<D>::new(numbering, pattern);
+        let held =
+            Held::new::<D>(numbering, pattern, held, &conditions.fixed, |row| layout.start(row));
+        let ghost = ghost_matrix(world, mesh, |face| face.stiffness)?.map(|matrix| {
+            let reaches = |row: usize| {
+                let values = &matrix.values[pattern.offsets[row]..pattern.offsets[row + 1]];
+                values.iter().any(|&value| value != 0.0)
+            };
+            GhostTerm { reaches: (0..numbering.owned).map(reaches).collect(), matrix }
+        });
+        let beside = vec![0.0; layout.len_beside()];
         Ok(Equilibrium {
             world,
             numbering,
@@ -111,8 +133,9 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             external_owned,
             ghost,
             inertia: None,
-            stiffness: BlockMatrix::zeros(pattern),
-            held_rows,
+            layout,
+            beside,
+            tangent: Tangent::Stale,
             displacement: vec![0.0; numbering.len() * D],
             previous_owned: vec![0.0; owned],
             internal_owned: vec![0.0; owned],
@@ -183,7 +206,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     pub fn ghost_energy(&self) -> f64 {
         let Some(ghost) = &self.ghost else { return 0.0 };
         let mut force = vec![0.0; self.numbering.owned * D];
-        add_product::<D>(ghost, self.pattern, &self.displacement, &mut force);
+        ghost.add_product::<D>(self.pattern, &self.displacement, &mut force);
         0.5 * force.iter().zip(&self.displacement).map(|(f, u)| f * u).sum::<f64>()
     }
 
@@ -192,21 +215,26 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self.numbering.halo.forward(self.world, &mut self.displacement, D)
     }
 
-    /// Evaluates force and tangent at the loaded displacement; false if it must be refused.
-    fn evaluate(&mut self) -> Result<bool> {
-        self.stiffness.values.fill(0.0);
-        if let Some(ghost) = &self.ghost {
-            add_scalar(ghost, self.pattern, &mut self.stiffness);
-        }
-        let mut force = vec![0.0; self.numbering.len() * D];
-        self.health = internal::assemble(
+    /// Evaluates the force at the loaded displacement, and the tangent where `matrix` is given;
+    /// false if it must be refused.
+    fn evaluate(&mut self, matrix: Option<&mut Matrix>) -> Result<bool> {
+        let numbering = self.numbering;
+        let mut force = vec![0.0; numbering.len() * D];
+        let mut storage = matrix.map(Matrix::storage).transpose()?;
+        let base = self.ghost.as_ref().map(|ghost| (&ghost.matrix, &ghost.reaches[..]));
+        let mut rows = match &mut storage {
+            Some((main, _)) => Some(InPlace::new(&self.layout, main, &mut self.beside, base)?),
+            None => None,
+        };
+        self.tangent = Tangent::Stale;
+        self.health = internal::assemble_into(
             self.step,
             self.settings.frame,
-            self.numbering,
+            numbering,
             self.pattern,
             &self.displacement,
             &mut force,
-            Some(&mut self.stiffness),
+            rows.as_mut(),
         )?;
         let refuse = !self.health.is_sound()
             || (self.settings.inverted == InvertedIterates::Reject
@@ -214,76 +242,67 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         if self.world.any(refuse) {
             return Ok(false);
         }
-        self.numbering.halo.reverse_add(self.world, &mut force, D)?;
-        force.truncate(self.numbering.owned * D);
+        numbering.halo.reverse_add(self.world, &mut force, D)?;
+        force.truncate(numbering.owned * D);
         if let Some(ghost) = &self.ghost {
-            add_product::<D>(ghost, self.pattern, &self.displacement, &mut force);
+            ghost.add_product::<D>(self.pattern, &self.displacement, &mut force);
         }
-        self.stiffness.reduce(self.world, self.pattern)?;
         if let Some(inertia) = &self.inertia {
-            for value in force.iter_mut().chain(&mut self.stiffness.values) {
-                *value *= inertia.share;
-            }
+            force.iter_mut().for_each(|value| *value *= inertia.share);
             add_product::<D>(&inertia.matrix, self.pattern, &self.displacement, &mut force);
-            add_scalar(&inertia.matrix, self.pattern, &mut self.stiffness);
         }
         self.internal_owned = force;
+        let Some(mut rows) = rows else { return Ok(true) };
+        rows.finish(self.pattern);
+        scatter::reduce(self.world, self.pattern, &mut rows)?;
+        if let Some(inertia) = &self.inertia {
+            inertia.join(self.pattern, numbering.owned, &mut rows);
+        }
+        if self.diagonal_scale == 0.0 {
+            self.diagonal_scale = mean_diagonal(
+                self.world,
+                numbering,
+                self.pattern,
+                |dof| !self.held.holds(dof),
+                &mut rows,
+            );
+        }
+        self.tangent = Tangent::Assembled;
         Ok(true)
     }
 
-    /// Values of the constrained matrix in compressed rows: held rows and columns become the
-    /// identity, scaled like the other diagonal entries so that smoothers see one scale.
-    pub fn constrained_values(&self) -> Vec<f64> {
-        let end = self.pattern.ghost_start * D * D;
-        let mut values = self.stiffness.values[..end].to_vec();
-        for row in 0..self.numbering.owned {
-            let range = self.pattern.offsets[row]..self.pattern.offsets[row + 1];
-            let width = range.len();
-            for i in 0..D {
-                let dof = row * D + i;
-                let start = D * D * range.start + i * width * D;
-                for (position, &column) in self.pattern.columns[range.clone()].iter().enumerate() {
-                    for k in 0..D {
-                        let other = column as usize * D + k;
-                        if self.held[dof] || self.held[other] {
-                            values[start + position * D + k] =
-                                if dof == other { self.diagonal_scale } else { 0.0 };
-                        }
-                    }
-                }
-            }
+    /// The residual of the last evaluation.
+    fn write_residual(&self, x: &[f64], f: &mut [f64]) {
+        for dof in 0..f.len() {
+            f[dof] = if self.held.holds(dof) {
+                self.diagonal_scale * (x[dof] - self.increment[dof])
+            } else {
+                self.internal_owned[dof] - self.external_owned[dof]
+            };
         }
-        values
     }
 
-    /// Mean size of the free diagonal entries over all ranks; 1 where there are none.
-    fn mean_diagonal(&self) -> f64 {
-        let (mut sum, mut count) = (0.0, 0usize);
-        for row in 0..self.numbering.owned {
-            let range = self.pattern.offsets[row]..self.pattern.offsets[row + 1];
-            let Some(position) = self.pattern.find(self.numbering, row, row) else { continue };
-            for i in 0..D {
-                if !self.held[row * D + i] {
-                    let start = D * D * range.start + i * range.len() * D;
-                    sum += self.stiffness.values[start + (position - range.start) * D + i].abs();
-                    count += 1;
-                }
-            }
+    fn timed_evaluation(
+        &mut self,
+        x: &[f64],
+        f: &mut [f64],
+        matrix: Option<&mut Matrix>,
+    ) -> Result<bool> {
+        let begin = Instant::now();
+        self.load_displacement(x)?;
+        let usable = self.evaluate(matrix)?;
+        self.assembly_seconds += begin.elapsed().as_secs_f64();
+        if usable {
+            self.write_residual(x, f);
         }
-        let (sum, count) = (self.world.sum(sum), self.world.sum_usize(count));
-        if count > 0 && sum > 0.0 { sum / count as f64 } else { 1.0 }
+        Ok(usable)
     }
 
-    /// Saves K's rows of the fixed degrees of freedom: the reactions of the coming solve.
-    fn save_held_rows(&mut self) {
-        self.held_rows.values.clear();
-        for &dof in &self.held_rows.rows {
-            let (row, i) = (dof as usize / D, dof as usize % D);
-            let range = self.pattern.offsets[row]..self.pattern.offsets[row + 1];
-            let start = D * D * range.start + i * range.len() * D;
-            let values = &self.stiffness.values[start..start + range.len() * D];
-            self.held_rows.values.extend_from_slice(values);
-        }
+    /// Whether the coming iterate will hardly need a tangent: its error is below the tolerance if
+    /// it falls by as much as the last one did. Newton's method mostly does better.
+    fn expects_convergence(&self) -> bool {
+        let [.., before, last] = self.errors[..] else { return false };
+        last * (last / before) <= self.settings.tolerance
     }
 
     /// f_react = f_int(old) + K (x - x_old) - f_ext on the fixed degrees of freedom.
@@ -293,19 +312,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             *c = new - old;
         }
         self.numbering.halo.forward(self.world, &mut change, D)?;
-        let mut entry = 0;
-        for &dof in &self.held_rows.rows {
-            let dof = dof as usize;
-            let row = dof / D;
-            let mut sum = 0.0;
-            for &column in
-                &self.pattern.columns[self.pattern.offsets[row]..self.pattern.offsets[row + 1]]
-            {
-                for k in 0..D {
-                    sum += self.held_rows.values[entry] * change[column as usize * D + k];
-                    entry += 1;
-                }
-            }
+        for (dof, sum) in self.held.reactions::<D>(self.pattern, &change) {
             self.reaction_owned[dof] = self.internal_previous[dof] + sum - self.external_owned[dof];
         }
         Ok(())
@@ -314,10 +321,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     /// Lagrangian eq. 40. Degrees of freedom left out carry no equation and do not count.
     fn normalised_error(&self) -> f64 {
         let (mut residual, mut actions) = (0.0, 0.0);
-        let mut next_fixed = self.held_rows.rows.iter().peekable();
+        let mut next_fixed = self.held.fixed().peekable();
         for dof in 0..self.external_owned.len() {
-            let fixed = next_fixed.next_if(|&&row| row as usize == dof).is_some();
-            if self.held[dof] && !fixed {
+            let fixed = next_fixed.next_if_eq(&dof).is_some();
+            if self.held.holds(dof) && !fixed {
                 continue;
             }
             let action = self.external_owned[dof] + self.reaction_owned[dof];
@@ -330,31 +337,42 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
 }
 
 impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
+    /// Without the tangent; [`NewtonProblem::jacobian`] then assembles it.
     fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
-        let begin = Instant::now();
-        self.load_displacement(x)?;
-        let usable = self.evaluate()?;
-        self.assembly_seconds += begin.elapsed().as_secs_f64();
-        if !usable {
-            return Ok(false);
-        }
         if self.diagonal_scale == 0.0 {
-            self.diagonal_scale = self.mean_diagonal();
+            self.diagonal_scale = 1.0;
         }
-        for dof in 0..f.len() {
-            f[dof] = if self.held[dof] {
-                self.diagonal_scale * (x[dof] - self.increment[dof])
-            } else {
-                self.internal_owned[dof] - self.external_owned[dof]
-            };
-        }
-        Ok(true)
+        self.timed_evaluation(x, f, None)
+    }
+
+    /// With the tangent, unless this is likely the step's last evaluation.
+    fn residual_and_matrix(
+        &mut self,
+        x: &[f64],
+        f: &mut [f64],
+        matrix: &mut Matrix,
+    ) -> Result<bool> {
+        let matrix = if self.expects_convergence() { None } else { Some(matrix) };
+        self.timed_evaluation(x, f, matrix)
     }
 
     fn jacobian(&mut self, _x: &[f64], matrix: &mut Matrix) -> Result<()> {
-        // The tangent was assembled with the residual of the same iterate.
-        self.save_held_rows();
-        matrix.update(&self.constrained_values())
+        if self.tangent == Tangent::Stale {
+            let begin = Instant::now();
+            self.evaluate(Some(matrix))?;
+            self.assembly_seconds += begin.elapsed().as_secs_f64();
+        }
+        if self.tangent == Tangent::Assembled {
+            let (mut main, mut other) = matrix.storage()?;
+            let mut rows = InPlace::filled(&self.layout, &mut main, &mut self.beside)?;
+            let scale = self.diagonal_scale;
+            self.held.constrain(self.numbering, self.pattern, scale, &mut rows);
+            if let Some(other) = &mut other {
+                rows.hand_over(other)?;
+            }
+            self.tangent = Tangent::Constrained;
+        }
+        matrix.changed()
     }
 
     /// Moves the columns of prescribed displacements to the right-hand side.
@@ -362,7 +380,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         let mut prescribed = vec![0.0; self.numbering.len() * D];
         let mut any = false;
         for (dof, value) in rhs.iter().enumerate() {
-            if self.held[dof] && *value != 0.0 {
+            if self.held.holds(dof) && *value != 0.0 {
                 prescribed[dof] = value / self.diagonal_scale;
                 any = true;
             }
@@ -371,22 +389,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
             return Ok(());
         }
         self.numbering.halo.forward(self.world, &mut prescribed, D)?;
-        for row in 0..self.numbering.owned {
-            let range = self.pattern.offsets[row]..self.pattern.offsets[row + 1];
-            for i in 0..D {
-                let dof = row * D + i;
-                if self.held[dof] {
-                    continue;
-                }
-                let start = D * D * range.start + i * range.len() * D;
-                for (position, &column) in self.pattern.columns[range.clone()].iter().enumerate() {
-                    for k in 0..D {
-                        rhs[dof] -= self.stiffness.values[start + position * D + k]
-                            * prescribed[column as usize * D + k];
-                    }
-                }
-            }
-        }
+        self.held.move_columns(&prescribed, rhs);
         Ok(())
     }
 
@@ -460,6 +463,62 @@ pub fn add_scalar<const D: usize>(
     }
 }
 
+impl GhostTerm {
+    /// force += K_G u over the owned rows.
+    fn add_product<const D: usize>(
+        &self,
+        pattern: &Pattern,
+        displacement: &[f64],
+        force: &mut [f64],
+    ) {
+        for row in (0..force.len() / D).filter(|&row| self.reaches[row]) {
+            add_row_product::<D>(&self.matrix, pattern, displacement, row, force);
+        }
+    }
+}
+
+impl Inertia {
+    /// K = share K + matrix.
+    fn join<const D: usize, R: BlockRows<D>>(&self, pattern: &Pattern, owned: usize, rows: &mut R) {
+        for row in 0..owned {
+            let range = pattern.offsets[row]..pattern.offsets[row + 1];
+            let width = range.len() * D;
+            let values = rows.values(rows.start(pattern, row), D * width);
+            for (i, line) in values.chunks_exact_mut(width).enumerate() {
+                let blocks = line.chunks_exact_mut(D);
+                for (block, add) in blocks.zip(&self.matrix.values[range.clone()]) {
+                    for value in &mut *block {
+                        *value *= self.share;
+                    }
+                    block[i] += add;
+                }
+            }
+        }
+    }
+}
+
+/// Mean size of the free diagonal entries over all ranks; 1 where there are none. Collective.
+fn mean_diagonal<const D: usize, R: BlockRows<D>>(
+    world: &World,
+    numbering: &Numbering,
+    pattern: &Pattern,
+    free: impl Fn(usize) -> bool,
+    rows: &mut R,
+) -> f64 {
+    let (mut sum, mut count) = (0.0, 0usize);
+    for row in 0..numbering.owned {
+        let range = pattern.offsets[row]..pattern.offsets[row + 1];
+        let Some(position) = pattern.find(numbering, row, row) else { continue };
+        let start = rows.start(pattern, row) + (position - range.start) * D;
+        for i in (0..D).filter(|i| free(row * D + i)) {
+            sum += rows.values(start + i * (range.len() * D + 1), 1)[0].abs();
+            count += 1;
+        }
+    }
+    let (sum, count) = (world.sum(sum), world.sum_usize(count));
+    if count > 0 && sum > 0.0 { sum / count as f64 } else { 1.0 }
+}
+
 /// force += (J ⊗ 1) u over the owned rows.
 fn add_product<const D: usize>(
     scalar: &BlockMatrix<1>,
@@ -468,11 +527,23 @@ fn add_product<const D: usize>(
     force: &mut [f64],
 ) {
     for row in 0..force.len() / D {
-        for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
-            let (value, column) = (scalar.values[entry], pattern.columns[entry] as usize);
-            for i in 0..D {
-                force[row * D + i] += value * displacement[column * D + i];
-            }
+        add_row_product::<D>(scalar, pattern, displacement, row, force);
+    }
+}
+
+/// The same in one row.
+#[inline]
+fn add_row_product<const D: usize>(
+    scalar: &BlockMatrix<1>,
+    pattern: &Pattern,
+    displacement: &[f64],
+    row: usize,
+    force: &mut [f64],
+) {
+    for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
+        let (value, column) = (scalar.values[entry], pattern.columns[entry] as usize);
+        for i in 0..D {
+            force[row * D + i] += value * displacement[column * D + i];
         }
     }
 }

@@ -9,6 +9,7 @@ use crate::mechanics::{self, Contribution, StepStart};
 use crate::points::Points;
 
 use super::kernel::{Batch, multiply_add};
+use super::scatter::BlockRows;
 use super::{BlockMatrix, Numbering, Pattern};
 
 /// What a step's points look like to the equations: fixed while the step is solved.
@@ -67,6 +68,19 @@ pub fn assemble<const D: usize>(
     force: &mut [f64],
     stiffness: Option<&mut BlockMatrix<D>>,
 ) -> Result<Health> {
+    assemble_into(step, frame, numbering, pattern, displacement, force, stiffness)
+}
+
+/// [`assemble`] into rows stored anywhere.
+pub fn assemble_into<const D: usize, R: BlockRows<D>>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    numbering: &Numbering,
+    pattern: &Pattern,
+    displacement: &[f64],
+    force: &mut [f64],
+    stiffness: Option<&mut R>,
+) -> Result<Health> {
     debug_assert!(numbering.len() * D <= force.len());
     let task = Task { step, frame, pattern, displacement };
     #[cfg(target_arch = "x86_64")]
@@ -74,18 +88,18 @@ pub fn assemble<const D: usize>(
         // SAFETY: the processor has just said that it knows the instructions.
         return Ok(unsafe { assemble_avx2(&task, force, stiffness) });
     }
-    Ok(task.assemble::<false>(force, stiffness))
+    Ok(task.assemble::<false, R>(force, stiffness))
 }
 
 /// [`Task::assemble`] compiled for AVX2 with fused multiply-add.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn assemble_avx2<const D: usize>(
+fn assemble_avx2<const D: usize, R: BlockRows<D>>(
     task: &Task<'_, D>,
     force: &mut [f64],
-    stiffness: Option<&mut BlockMatrix<D>>,
+    stiffness: Option<&mut R>,
 ) -> Health {
-    task.assemble::<true>(force, stiffness)
+    task.assemble::<true, R>(force, stiffness)
 }
 
 /// What an evaluation reads.
@@ -101,22 +115,25 @@ struct Workspace<const D: usize> {
     displacement: Vec<[f64; D]>,
     force: Vec<[f64; D]>,
     gradients: Vec<[f64; D]>,
+    /// Address and width of each node's scalar rows.
+    rows: Vec<(usize, usize)>,
     batch: Batch,
 }
 
 impl<const D: usize> Task<'_, D> {
     /// Inlined into each form so that it is compiled for that form's instructions.
     #[inline(always)]
-    fn assemble<const FUSED: bool>(
+    fn assemble<const FUSED: bool, R: BlockRows<D>>(
         &self,
         force: &mut [f64],
-        mut stiffness: Option<&mut BlockMatrix<D>>,
+        mut stiffness: Option<&mut R>,
     ) -> Health {
         let mut health = Health::default();
         let mut work = Workspace {
             displacement: Vec::new(),
             force: Vec::new(),
             gradients: Vec::new(),
+            rows: Vec::new(),
             batch: Batch::default(),
         };
         let groups = self.step.groups;
@@ -131,13 +148,16 @@ impl<const D: usize> Task<'_, D> {
             work.force.clear();
             work.force.resize(nodes.len(), [0.0; D]);
             work.batch.start::<D>(nodes.len());
+            if let Some(matrix) = stiffness.as_deref_mut() {
+                self.find_rows(nodes, matrix, &mut work.rows);
+            }
             for &p in groups.points(group) {
                 self.add_point::<FUSED>(p, &mut work, &mut health, stiffness.is_some());
                 if work.batch.is_full() {
-                    self.flush::<FUSED>(group, nodes, &mut work.batch, stiffness.as_deref_mut());
+                    self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
                 }
             }
-            self.flush::<FUSED>(group, nodes, &mut work.batch, stiffness.as_deref_mut());
+            self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
             for (&node, sum) in nodes.iter().zip(&work.force) {
                 for i in 0..D {
                     force[node as usize * D + i] += sum[i];
@@ -148,24 +168,33 @@ impl<const D: usize> Task<'_, D> {
     }
 
     #[inline(always)]
-    fn flush<const FUSED: bool>(
+    fn find_rows<R: BlockRows<D>>(
+        &self,
+        nodes: &[u32],
+        matrix: &mut R,
+        rows: &mut Vec<(usize, usize)>,
+    ) {
+        let pattern = self.pattern;
+        rows.clear();
+        for &node in nodes {
+            let row = pattern.row_of[node as usize] as usize;
+            matrix.touch(pattern, row);
+            let width = pattern.offsets[row + 1] - pattern.offsets[row];
+            rows.push((matrix.start(pattern, row), D * width));
+        }
+    }
+
+    #[inline(always)]
+    fn flush<const FUSED: bool, R: BlockRows<D>>(
         &self,
         group: usize,
-        nodes: &[u32],
-        batch: &mut Batch,
-        stiffness: Option<&mut BlockMatrix<D>>,
+        work: &mut Workspace<D>,
+        stiffness: Option<&mut R>,
     ) {
         let Some(matrix) = stiffness else { return };
-        if batch.is_empty() {
-            return;
+        if !work.batch.is_empty() {
+            work.batch.flush::<D, FUSED, R>(self.pattern.places.of(group), &work.rows, matrix);
         }
-        let pattern = self.pattern;
-        let rows = |a: usize| {
-            let row = pattern.row_of[nodes[a] as usize] as usize;
-            let (start, end) = (pattern.offsets[row], pattern.offsets[row + 1]);
-            (D * D * start, D * (end - start))
-        };
-        batch.flush::<D, FUSED>(pattern.places.of(group), rows, &mut matrix.values);
     }
 
     #[inline(always)]

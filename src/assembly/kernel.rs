@@ -5,6 +5,7 @@
 use crate::mechanics::Contribution;
 
 use super::places::Place;
+use super::scatter::BlockRows;
 
 /// Rows of a tile: so many gradients share each load of a flux.
 const TALL: usize = 4;
@@ -88,14 +89,14 @@ impl Batch {
         }
     }
 
-    /// Adds the batch into the sparse rows and empties it. `rows` gives the first value and the
-    /// width in values of the scalar rows of each node.
+    /// Adds the batch into the sparse rows and empties it. `rows` gives the address of each
+    /// node's first value and the width of its scalar rows in values.
     #[inline(always)]
-    pub fn flush<const D: usize, const FUSED: bool>(
+    pub fn flush<const D: usize, const FUSED: bool, R: BlockRows<D>>(
         &mut self,
         place: Place<'_>,
-        rows: impl Fn(usize) -> (usize, usize),
-        values: &mut [f64],
+        rows: &[(usize, usize)],
+        values: &mut R,
     ) {
         let depth = self.points * D;
         self.points = 0;
@@ -115,9 +116,8 @@ impl Batch {
                 }
                 for row in 0..tall {
                     let node = a + row;
-                    let (start, width) = rows(node);
-                    let start = start + i * width;
-                    let target = &mut values[start..start + width];
+                    let (start, width) = rows[node];
+                    let target = values.values(start + i * width, width);
                     let source = &self.strip[row * self.stride..row * self.stride + n * D];
                     let runs = n / place.run;
                     let positions = &place.positions[node * runs..(node + 1) * runs];

@@ -16,6 +16,8 @@
 //! | `iteration.rs` | conjugate gradients on several right-hand sides |
 //! | `incomplete.rs` | their preconditioner: Cholesky without fill |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
+//! | `in_place.rs` | those rows in the solver's own memory |
+//! | `held.rs` | held degrees of freedom in those rows |
 //! | `external.rs` | gravity, body forces, point forces (Lagrangian eq. 29) |
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
@@ -24,6 +26,8 @@ pub mod conditions;
 pub mod envelope;
 pub mod external;
 pub mod graph;
+pub mod held;
+pub mod in_place;
 mod incomplete;
 pub mod internal;
 pub mod inverse;

@@ -14,6 +14,38 @@ pub struct BlockMatrix<const B: usize> {
     pub values: Vec<f64>,
 }
 
+/// Rows of a [`Pattern`], wherever they are stored: a block row is B scalar rows one after the
+/// other, each of B values per column.
+pub trait BlockRows<const B: usize> {
+    /// Address of the first value of a block row.
+    fn start(&self, pattern: &Pattern, row: usize) -> usize;
+
+    /// `length` values of one row from address `start` on.
+    fn values(&mut self, start: usize, length: usize) -> &mut [f64];
+
+    /// To be called before anything is added to a row.
+    fn touch(&mut self, _pattern: &Pattern, _row: usize) {}
+
+    /// The rows that belong to other ranks, one after the other.
+    fn ghosts(&self, pattern: &Pattern) -> &[f64];
+}
+
+impl<const B: usize> BlockRows<B> for BlockMatrix<B> {
+    #[inline(always)]
+    fn start(&self, pattern: &Pattern, row: usize) -> usize {
+        B * B * pattern.offsets[row]
+    }
+
+    #[inline(always)]
+    fn values(&mut self, start: usize, length: usize) -> &mut [f64] {
+        &mut self.values[start..start + length]
+    }
+
+    fn ghosts(&self, pattern: &Pattern) -> &[f64] {
+        &self.values[B * B * pattern.ghost_start..]
+    }
+}
+
 impl<const B: usize> BlockMatrix<B> {
     pub fn zeros(pattern: &Pattern) -> Self {
         BlockMatrix { values: vec![0.0; pattern.columns.len() * B * B] }
@@ -51,51 +83,65 @@ impl<const B: usize> BlockMatrix<B> {
         }
     }
 
-    /// Sends the ghost rows to their owners, who add them in ascending rank order. Collective.
+    /// [`reduce`] of this matrix. Collective.
     pub fn reduce(&mut self, world: &World, pattern: &Pattern) -> Result<()> {
-        let ghosts = &self.values[B * B * pattern.ghost_start..];
-        let outgoing = pattern
-            .sends
-            .iter()
-            .map(|(rank, range)| (*rank, ghosts[B * B * range.start..B * B * range.end].to_vec()))
-            .collect();
-        let incoming = exchange(world, outgoing)?;
-        let mut by_rank = incoming.into_iter();
-        for (rank, positions) in &pattern.receives {
-            let Some((from, words)) = by_rank.next() else { break };
-            debug_assert_eq!(from, *rank);
-            self.add_received(pattern, positions, &words);
-        }
-        Ok(())
+        reduce(world, pattern, self)
     }
+}
 
-    /// Entries arrive in the sender's layout: row by row, each row as B scalar rows.
-    fn add_received(&mut self, pattern: &Pattern, positions: &[u32], words: &[f64]) {
-        let mut entry = 0;
-        while entry < positions.len() {
-            // Entries of one row are consecutive and ascend within the owner's row.
-            let row = row_of_entry(pattern, positions[entry] as usize);
-            let range = pattern.offsets[row]..pattern.offsets[row + 1];
-            let mut end = entry + 1;
-            while end < positions.len()
-                && positions[end] > positions[end - 1]
-                && range.contains(&(positions[end] as usize))
-            {
-                end += 1;
-            }
-            let (width, sent) = (range.len(), end - entry);
-            for i in 0..B {
-                for (j, &position) in positions[entry..end].iter().enumerate() {
-                    let target =
-                        B * B * range.start + (i * width + position as usize - range.start) * B;
-                    let source = B * B * entry + (i * sent + j) * B;
-                    for k in 0..B {
-                        self.values[target + k] += words[source + k];
-                    }
+/// Sends the ghost rows to their owners, who add them in ascending rank order. Collective.
+pub fn reduce<const B: usize, R: BlockRows<B>>(
+    world: &World,
+    pattern: &Pattern,
+    rows: &mut R,
+) -> Result<()> {
+    let ghosts = rows.ghosts(pattern);
+    let outgoing = pattern
+        .sends
+        .iter()
+        .map(|(rank, range)| (*rank, ghosts[B * B * range.start..B * B * range.end].to_vec()))
+        .collect();
+    let incoming = exchange(world, outgoing)?;
+    let mut by_rank = incoming.into_iter();
+    for (rank, positions) in &pattern.receives {
+        let Some((from, words)) = by_rank.next() else { break };
+        debug_assert_eq!(from, *rank);
+        add_received(pattern, rows, positions, &words);
+    }
+    Ok(())
+}
+
+/// Entries arrive in the sender's layout: row by row, each row as B scalar rows.
+fn add_received<const B: usize, R: BlockRows<B>>(
+    pattern: &Pattern,
+    rows: &mut R,
+    positions: &[u32],
+    words: &[f64],
+) {
+    let mut entry = 0;
+    while entry < positions.len() {
+        // Entries of one row are consecutive and ascend within the owner's row.
+        let row = row_of_entry(pattern, positions[entry] as usize);
+        let range = pattern.offsets[row]..pattern.offsets[row + 1];
+        let mut end = entry + 1;
+        while end < positions.len()
+            && positions[end] > positions[end - 1]
+            && range.contains(&(positions[end] as usize))
+        {
+            end += 1;
+        }
+        let (width, sent) = (range.len(), end - entry);
+        let values = rows.values(rows.start(pattern, row), B * B * width);
+        for i in 0..B {
+            for (j, &position) in positions[entry..end].iter().enumerate() {
+                let target = (i * width + position as usize - range.start) * B;
+                let source = B * B * entry + (i * sent + j) * B;
+                for k in 0..B {
+                    values[target + k] += words[source + k];
                 }
             }
-            entry = end;
         }
+        entry = end;
     }
 }
 

@@ -4,6 +4,7 @@
 //! the others. With columns sorted, a row of ours is left part + own part + right part, so an
 //! update is three block copies per row into PETSc's own arrays.
 
+use std::marker::PhantomData;
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -148,6 +149,21 @@ impl Matrix {
                 }
             }
         }
+        self.changed()
+    }
+
+    /// The stored values, to be written in place: row by row those in own columns, and those in
+    /// the columns of other ranks (`None` on one rank), ascending. To be followed by
+    /// [`Self::changed`].
+    pub fn storage(&mut self) -> Result<(Entries<'_>, Option<Entries<'_>>)> {
+        Ok(match self.parts()? {
+            None => (Entries::of(self.raw)?, None),
+            Some((diagonal, other)) => (Entries::of(diagonal)?, Some(Entries::of(other)?)),
+        })
+    }
+
+    /// Makes solvers see what was written in place. Collective, but without communication.
+    pub fn changed(&mut self) -> Result<()> {
         petsc!(MatAssemblyBegin(self.raw, sys::MAT_FINAL_ASSEMBLY))?;
         petsc!(MatAssemblyEnd(self.raw, sys::MAT_FINAL_ASSEMBLY))?;
         self.declare_symmetry()
@@ -236,23 +252,25 @@ impl Drop for Matrix {
     }
 }
 
-/// The array of stored values of a sequential matrix, to be overwritten.
-struct Entries {
+/// The array of stored values of a sequential matrix, to be overwritten while the [`Matrix`] that
+/// holds it is borrowed.
+pub struct Entries<'a> {
     raw: sys::Mat,
     pointer: *mut f64,
     count: usize,
+    owner: PhantomData<&'a mut Matrix>,
 }
 
-impl Entries {
+impl Entries<'_> {
     fn of(raw: sys::Mat) -> Result<Self> {
         let count = stored(raw)?;
         let mut pointer = null_mut();
         petsc!(MatSeqAIJGetArray(raw, &mut pointer))?;
-        Ok(Entries { raw, pointer, count })
+        Ok(Entries { raw, pointer, count, owner: PhantomData })
     }
 }
 
-impl std::ops::Deref for Entries {
+impl std::ops::Deref for Entries<'_> {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
         if self.count == 0 {
@@ -263,7 +281,7 @@ impl std::ops::Deref for Entries {
     }
 }
 
-impl std::ops::DerefMut for Entries {
+impl std::ops::DerefMut for Entries<'_> {
     fn deref_mut(&mut self) -> &mut [f64] {
         if self.count == 0 {
             return &mut [];
@@ -273,7 +291,7 @@ impl std::ops::DerefMut for Entries {
     }
 }
 
-impl Drop for Entries {
+impl Drop for Entries<'_> {
     fn drop(&mut self) {
         // SAFETY: returns what `of` took, and marks the matrix as changed.
         unsafe { sys::MatSeqAIJRestoreArray(self.raw, &mut self.pointer) };

@@ -38,16 +38,25 @@ impl fmt::Display for Sample {
 
 /// Times `work` over `count` points.
 pub fn sample(count: usize, mut work: impl FnMut()) -> Sample {
-    work();
-    let mut times: Vec<f64> = (0..RUNS)
-        .map(|_| {
+    let [sample] = sample_parts(count, |_| work());
+    sample
+}
+
+/// Times each of the parts 0, 1, ... of `work`, which follow each other, over `count` points.
+pub fn sample_parts<const N: usize>(count: usize, mut work: impl FnMut(usize)) -> [Sample; N] {
+    (0..N).for_each(&mut work);
+    let mut times = [[0.0; RUNS]; N];
+    for run in 0..RUNS {
+        for (part, times) in times.iter_mut().enumerate() {
             let begin = processor_seconds();
-            work();
-            (processor_seconds() - begin) * 1e9 / count as f64
-        })
-        .collect();
-    times.sort_by(f64::total_cmp);
-    Sample { median: times[RUNS / 2], least: times[0] }
+            work(part);
+            times[run] = (processor_seconds() - begin) * 1e9 / count as f64;
+        }
+    }
+    times.map(|mut times| {
+        times.sort_by(f64::total_cmp);
+        Sample { median: times[RUNS / 2], least: times[0] }
+    })
 }
 
 /// Processor model, cores, memory.
