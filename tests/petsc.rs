@@ -6,7 +6,7 @@ use common::{on_ranks, on_ranks_with};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::error::{Error, Result};
-use mpm_par::petsc::{self, Ksp, Matrix, NewtonProblem, Session, Snes, Vector, Verdict};
+use mpm_par::petsc::{self, Blocks, Ksp, Matrix, NewtonProblem, Session, Snes, Vector, Verdict};
 
 /// This rank's rows of a system of `n` rows in blocks of `block`; rank 1 gets none.
 fn share(comm: &SimpleCommunicator, n: usize, block: usize) -> std::ops::Range<usize> {
@@ -458,6 +458,211 @@ fn linear_tolerances_follow_the_nonlinear_residual() {
         let refused = solver("f_").map(|_| ()).unwrap_err();
         assert!(matches!(refused, Error::Input(_)), "{refused}");
         assert!(refused.to_string().contains("-f_snes_ksp_ew_version 3"), "{refused}");
+        assert!(session.unused_options().unwrap().is_empty());
+    });
+}
+
+/// Rows `own` of a grid of `n` x `n` nodes with `block` unknowns each: coupled to the nodes around,
+/// `shift` per row of `own` more on the diagonal.
+fn membrane(
+    own: &std::ops::Range<usize>,
+    n: usize,
+    block: usize,
+    shift: impl Fn(usize) -> f64,
+) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
+    let (mut offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
+    for row in own.clone() {
+        let (node, axis) = (row / block, row % block);
+        let (i, j) = (node % n, node / n);
+        for b in j.saturating_sub(1)..=(j + 1).min(n - 1) {
+            for a in i.saturating_sub(1)..=(i + 1).min(n - 1) {
+                let other = b * n + a;
+                for other_axis in 0..block {
+                    let coupling = if axis == other_axis { 1.0 } else { 0.1 };
+                    let own_share = if other == node { 8.3 } else { -1.0 };
+                    let more = if other * block + other_axis == row { shift(row) } else { 0.0 };
+                    columns.push((other * block + other_axis) as i32);
+                    values.push(coupling * own_share + more);
+                }
+            }
+        }
+        offsets.push(columns.len() as i32);
+    }
+    (offsets, columns, values)
+}
+
+#[test]
+fn blocks_in_single_precision_multiply_like_the_rows_they_come_from() {
+    let n = 13;
+    for block in [2, 3] {
+        let rows = n * n * block;
+        let (offsets, columns, mut values) = membrane(&(0..rows), n, block, |_| 0.0);
+        for (k, value) in values.iter_mut().enumerate() {
+            *value *= 1.0 + (k as f64 * 0.7).sin() / 3.0;
+        }
+        let mut blocks = Blocks::of_pattern(block, &offsets, &columns).unwrap();
+        blocks.fill(&offsets, &values);
+        let x: Vec<f64> = (0..rows).map(|k| (k as f64 * 1.3).cos()).collect();
+        let (mut fast, mut plain, mut sum) = (vec![f64::NAN; rows], vec![7.0; rows], x.clone());
+        blocks.multiply(&x, &mut fast);
+        blocks.multiply_plain(&x, &mut plain);
+        blocks.multiply_add(&x, &mut sum);
+        for r in 0..rows {
+            let row = offsets[r] as usize..offsets[r + 1] as usize;
+            let terms = row.map(|k| f64::from(values[k] as f32) * x[columns[k] as usize]);
+            let (exact, size) = terms.fold((0.0, 0.0), |(s, t), v: f64| (s + v, t + v.abs()));
+            let tolerance = 1e-15 * size;
+            assert!((fast[r] - exact).abs() < tolerance, "{block}, {r}: {} {exact}", fast[r]);
+            assert!((plain[r] - exact).abs() < tolerance, "{block}, {r}: {} {exact}", plain[r]);
+            assert!((sum[r] - x[r] - exact).abs() < tolerance + 1e-15, "{block}, {r}");
+        }
+        // Rows without entries, at the end too.
+        let empty: Vec<i32> = std::iter::repeat_n(0, 2 * block)
+            .chain(offsets.iter().copied())
+            .chain(std::iter::repeat_n(offsets[rows], block))
+            .collect();
+        let mut blocks = Blocks::of_pattern(block, &empty, &columns).unwrap();
+        blocks.fill(&empty, &values);
+        let mut shifted = vec![f64::NAN; rows + 3 * block];
+        blocks.multiply(&x, &mut shifted);
+        assert_eq!(shifted[2 * block..2 * block + rows], fast);
+        assert!(shifted[..2 * block].iter().chain(&shifted[2 * block + rows..]).all(|&v| v == 0.0));
+        // What is not made of whole blocks, of the same in all rows of a block, or of this size.
+        assert!(Blocks::of_pattern(block, &offsets[..rows], &columns).is_none());
+        assert!(Blocks::of_pattern(1, &offsets, &columns).is_none());
+        let mut other = columns.clone();
+        other[block] += block as i32;
+        assert!(Blocks::of_pattern(block, &offsets, &other).is_none());
+        other = columns.clone();
+        other[0] += 1;
+        assert!(Blocks::of_pattern(block, &offsets, &other).is_none());
+    }
+}
+
+/// x^3 + A x = 1 with [`membrane`]'s A.
+struct Membrane {
+    own: std::ops::Range<usize>,
+    n: usize,
+    block: usize,
+    product: (Matrix, Vector, Vector),
+    residual: f64,
+}
+
+impl NewtonProblem for Membrane {
+    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+        let (matrix, place, product) = &mut self.product;
+        place.values_mut()?.copy_from_slice(x);
+        matrix.mult(place, product)?;
+        for ((f, x), t) in f.iter_mut().zip(x).zip(product.values()?.iter()) {
+            *f = x.powi(3) + t - 1.0;
+        }
+        place.values_mut()?.copy_from_slice(f);
+        self.residual = place.norm()?;
+        Ok(true)
+    }
+
+    fn jacobian(&mut self, x: &[f64], matrix: &mut Matrix) -> Result<()> {
+        let shift = |row: usize| 3.0 * x[row - self.own.start].powi(2);
+        matrix.update(&membrane(&self.own, self.n, self.block, shift).2)
+    }
+
+    fn before_solve(&mut self, _rhs: &mut [f64]) -> Result<()> {
+        Ok(())
+    }
+
+    fn assess(&mut self, _iteration: usize, _x: &[f64], _f: &[f64]) -> Result<Verdict> {
+        Ok(if self.residual < 1e-9 { Verdict::Converged } else { Verdict::Continue })
+    }
+}
+
+#[test]
+fn multigrid_smooths_in_single_precision_and_steps_back() {
+    const NAME: &str = "multigrid_smooths_in_single_precision_and_steps_back";
+    on_ranks(NAME, &[1, 2, 3, 4], |universe| {
+        let table = [
+            ("off_mg_levels_single", "false"),
+            ("sor_mg_levels_pc_type", "sor"),
+            ("rich_mg_levels_ksp_type", "richardson"),
+            ("est_mg_levels_ksp_chebyshev_esteig", "0,0.1,0,1.1"),
+            ("est_pc_gamg_use_sa_esteig", "false"),
+            ("hypre_pc_type", "hypre"),
+            ("new_snes_lag_preconditioner", "1"),
+            ("reuse_snes_lag_preconditioner", "1"),
+            ("reuse_pc_gamg_reuse_interpolation", "true"),
+        ]
+        .map(|(name, value)| (name.to_string(), value.to_string()));
+        let session = Session::start(universe, &table, &[]).unwrap();
+        let world = universe.world();
+        for block in [2, 3] {
+            let n = 24;
+            let own = share(&world, n * n * block, block);
+            let new = || {
+                let (offsets, columns, values) = membrane(&own, n, block, |_| 0.0);
+                let mut a = Matrix::from_csr(&world, block, own.len(), &offsets, &columns, &values)
+                    .unwrap();
+                a.set_symmetric(true).unwrap();
+                a
+            };
+            let solve = |prefix: &str| {
+                let mut snes = Snes::new(&world, prefix, 30).unwrap();
+                snes.set_defaults(&[
+                    ("ksp_type", "cg"),
+                    ("pc_type", "gamg"),
+                    ("mg_levels_ksp_type", "chebyshev"),
+                    ("mg_levels_pc_type", "jacobi"),
+                    ("snes_lag_preconditioner", "1000"),
+                ])
+                .unwrap();
+                snes.set_from_options().unwrap();
+                let (product, mut a) = (new(), new());
+                let vectors = (product.vector().unwrap(), product.vector().unwrap());
+                let product = (product, vectors.0, vectors.1);
+                let own = own.clone();
+                let mut problem = Membrane { own, n, block, product, residual: f64::NAN };
+                let mut x = a.vector().unwrap();
+                // Twice: the hierarchy may have to be made anew for changed values.
+                let outcome = snes.solve(&mut problem, &mut a, &mut x).unwrap();
+                let levels = snes.ksp().unwrap().levels_in_single().unwrap();
+                if prefix == "sor_" {
+                    // It fails on coarse rows without entries, with or without our matrices.
+                    return (outcome, levels, x);
+                }
+                assert!(outcome.converged && outcome.iterations > 2, "{prefix} {outcome:?}");
+                x.set(1.0).unwrap();
+                let again = snes.solve(&mut problem, &mut a, &mut x).unwrap();
+                assert!(again.converged, "{prefix} {again:?}");
+                assert_eq!(levels, snes.ksp().unwrap().levels_in_single().unwrap(), "{prefix}");
+                (outcome, levels, x)
+            };
+            let (exact, none, reference) = solve("off_");
+            assert_eq!(none, 0);
+            for (prefix, single) in [
+                ("on_", true),
+                ("new_", true),
+                ("reuse_", true),
+                ("sor_", false),
+                ("rich_", false),
+                ("est_", false),
+                ("hypre_", false),
+            ] {
+                let (outcome, levels, mut x) = solve(prefix);
+                assert_eq!(levels > 0, single, "{prefix}: {levels} levels");
+                if !outcome.converged {
+                    continue;
+                }
+                if prefix == "on_" {
+                    let (_, _, again) = solve(prefix);
+                    assert_eq!(*again.values().unwrap(), *x.values().unwrap(), "same bits");
+                }
+                x.axpy(-1.0, &reference).unwrap();
+                assert!(x.norm_max().unwrap() < 1e-9, "{prefix}: {}", x.norm_max().unwrap());
+                if prefix == "on_" {
+                    assert_eq!(outcome.iterations, exact.iterations);
+                    let [a, b] = [&outcome, &exact].map(|o| o.linear_iterations_total);
+                    assert!(a.abs_diff(b) <= 1, "{a} and {b} linear iterations");
+                }
+            }
+        }
         assert!(session.unused_options().unwrap().is_empty());
     });
 }

@@ -66,6 +66,14 @@ pub(super) fn check(code: sys::PetscErrorCode, function: &str) -> Result<()> {
     })
 }
 
+/// The return code of a callback of our own that failed; the text is there for the caller of PETSc.
+pub(super) fn keep(error: &Error) -> sys::PetscErrorCode {
+    if let Ok(mut message) = MESSAGE.lock() {
+        *message = error.to_string();
+    }
+    sys::PETSC_ERR_USER as sys::PetscErrorCode
+}
+
 /// Copy of a C string; empty for null.
 pub(super) fn text_of(text: *const c_char) -> String {
     if text.is_null() {

@@ -35,6 +35,8 @@ const READ_LATER: [&str; 8] = [
     "snes_converged",
     "snes_monitor",
 ];
+/// Our own, of multigrid's levels.
+const OWN: &str = "mg_levels_single";
 /// Beginnings of unprefixed names that belong to no solver, or are read at PETSc's end.
 const GENERAL: [&str; 18] = [
     "log",
@@ -165,7 +167,7 @@ fn judge(name: &str, value: &str) -> Result<Answer> {
         return Ok(if begins(&GENERAL, name) { Answer::Known } else { Answer::Unknown });
     };
     let base = without_nesting(own);
-    if begins(&READ_LATER, base) { Ok(Answer::Known) } else { ask(base, value) }
+    if own == OWN || begins(&READ_LATER, base) { Ok(Answer::Known) } else { ask(base, value) }
 }
 
 /// `mg_levels_1_pc_type` is `pc_type` of a solver inside.

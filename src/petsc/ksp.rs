@@ -7,7 +7,7 @@ use mpi::traits::{AsRaw, Communicator};
 
 use super::check::{bool_of, c_text, petsc, require_running, running, text_of};
 use super::vector::index;
-use super::{Matrix, Vector, sys};
+use super::{Matrix, Vector, smoother, sys};
 use crate::error::{Error, Result};
 
 /// Owner of a PETSc `KSP`.
@@ -129,6 +129,11 @@ impl Ksp {
     pub fn solve(&mut self, b: &Vector, x: &mut Vector) -> Result<KspOutcome> {
         petsc!(KSPSolve(self.raw, b.raw(), x.raw()))?;
         outcome(self.raw)
+    }
+
+    /// Levels of multigrid that are smoothed with a matrix in single precision.
+    pub fn levels_in_single(&self) -> Result<usize> {
+        smoother::count(self.raw)
     }
 
     /// Method and preconditioner in use, for the report: for example "cg + gamg".

@@ -9,6 +9,8 @@
 //! | `known.rs` | options no solver knows, told before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
+//! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks in single precision |
+//! | `smoother.rs` | multigrid's smoothers on such matrices |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
 //! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
 //! | `forcing.rs` | [`Forcing`]: how well each linear solve of Newton's method is worth doing |
@@ -17,6 +19,7 @@
 //! Every constructor and every method that talks to a communicator is collective. Objects that
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
+mod blocks;
 mod check;
 mod forcing;
 pub mod known;
@@ -25,10 +28,12 @@ pub mod log;
 pub mod matrix;
 pub mod options;
 pub mod session;
+mod smoother;
 pub mod snes;
 pub mod sys;
 pub mod vector;
 
+pub use blocks::Blocks;
 pub use check::agree;
 pub use forcing::Forcing;
 pub use ksp::{Ksp, KspOutcome};

@@ -15,7 +15,7 @@ use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
 use super::ksp;
 use super::vector::{Values, ValuesMut, index};
-use super::{Ksp, Matrix, Vector, sys};
+use super::{Ksp, Matrix, Vector, smoother, sys};
 use crate::error::{Error, Result};
 
 /// The problem's judgement of an iterate.
@@ -328,6 +328,7 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     let result =
         unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
     context.settle(result, |context, ()| {
+        smoother::compact(inner, context.comm)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, f64::from(sys::PETSC_DEFAULT));
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;

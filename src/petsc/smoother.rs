@@ -1,0 +1,377 @@
+//! Multigrid's smoothers on matrices in single precision.
+//!
+//! Chebyshev's method and the residual of a level only multiply by the level's matrix, which
+//! streams from memory: in [`Blocks`] it has less than half the bytes. The iteration outside keeps
+//! the exact matrix, so the answer is the same; the preconditioner stays fixed and symmetric.
+//! `-<prefix>mg_levels_single false` leaves PETSc's matrices in place.
+
+use std::ffi::c_void;
+use std::ptr::{null, null_mut};
+
+use mpi::collective::SystemOperation;
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::{AsRaw, CommunicatorCollectives};
+
+use super::blocks::Blocks;
+use super::check::{check, keep, petsc, running};
+use super::sys;
+use super::vector::{Values, ValuesMut, index};
+use crate::error::Result;
+
+/// Gives the levels of a GAMG preconditioner their matrices in single precision, where they are
+/// smoothed by Chebyshev's method with Jacobi's; sets the solver up if that is due. Any other
+/// solver is left alone. Collective; `ksp` has its operators.
+pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
+    let (mut pc, mut levels) = (null_mut(), 0);
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    if !is_type(pc.cast(), sys::PCGAMG)? || !wanted(ksp)? {
+        return Ok(());
+    }
+    petsc!(KSPSetUp(ksp))?;
+    petsc!(PCMGGetLevels(pc, &mut levels))?;
+    for level in 1..levels {
+        let mut smoother = null_mut();
+        petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
+        let Some(matrix) = replaceable(smoother)? else { continue };
+        let Some(shell) = Shell::of(matrix, comm)? else { continue };
+        petsc!(KSPSetOperators(smoother, shell.0, matrix))?;
+        petsc!(PCMGSetResidual(pc, level, Some(sys::PCMGResidualDefault), shell.0))?;
+    }
+    Ok(())
+}
+
+/// Levels that have such a matrix.
+pub(super) fn count(ksp: sys::KSP) -> Result<usize> {
+    let (mut pc, mut levels, mut count) = (null_mut(), 0, 0);
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    if !is_type(pc.cast(), sys::PCGAMG)? {
+        return Ok(0);
+    }
+    petsc!(PCMGGetLevels(pc, &mut levels))?;
+    for level in 1..levels {
+        let (mut smoother, mut matrix) = (null_mut(), null_mut());
+        petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
+        petsc!(KSPGetOperators(smoother, &mut matrix, null_mut()))?;
+        count += usize::from(is_type(matrix.cast(), sys::MATSHELL)?);
+    }
+    Ok(count)
+}
+
+fn wanted(ksp: sys::KSP) -> Result<bool> {
+    let name = c"-mg_levels_single".as_ptr();
+    let (mut prefix, mut value) = (null(), sys::PETSC_TRUE);
+    petsc!(KSPGetOptionsPrefix(ksp, &mut prefix))?;
+    petsc!(PetscOptionsGetBool(null_mut(), prefix, name, &mut value, null_mut()))?;
+    Ok(value != sys::PETSC_FALSE)
+}
+
+/// The matrix of a level that is smoothed with products alone and with known eigenvalues (an
+/// estimate would be made anew for another matrix).
+fn replaceable(smoother: sys::KSP) -> Result<Option<sys::Mat>> {
+    let (mut pc, mut estimator) = (null_mut(), null_mut());
+    let (mut matrix, mut other) = (null_mut(), null_mut());
+    petsc!(KSPGetPC(smoother, &mut pc))?;
+    if !is_type(smoother.cast(), sys::KSPCHEBYSHEV)? || !is_type(pc.cast(), sys::PCJACOBI)? {
+        return Ok(None);
+    }
+    petsc!(KSPChebyshevEstEigGetKSP(smoother, &mut estimator))?;
+    petsc!(KSPGetOperators(smoother, &mut matrix, &mut other))?;
+    let kept = estimator.is_null() && matrix == other;
+    let compressed =
+        is_type(matrix.cast(), sys::MATSEQAIJ)? || is_type(matrix.cast(), sys::MATMPIAIJ)?;
+    Ok((kept && compressed).then_some(matrix))
+}
+
+fn is_type(object: sys::PetscObject, kind: &[u8]) -> Result<bool> {
+    let mut same = sys::PETSC_FALSE;
+    petsc!(PetscObjectTypeCompare(object, kind.as_ptr().cast(), &mut same))?;
+    Ok(same != sys::PETSC_FALSE)
+}
+
+/// One reference to a PETSc shell matrix over a [`Product`].
+struct Shell(sys::Mat);
+
+impl Shell {
+    /// `None` where the matrix is not made of blocks, on any rank. Collective.
+    fn of(matrix: sys::Mat, comm: &SimpleCommunicator) -> Result<Option<Self>> {
+        let Some(product) = Product::of(matrix, comm)? else { return Ok(None) };
+        let (mut rows, mut columns) = (0, 0);
+        petsc!(MatGetLocalSize(matrix, &mut rows, &mut columns))?;
+        let mut shell = Shell(null_mut());
+        let data = Box::into_raw(Box::new(product)).cast::<c_void>();
+        let all = sys::PETSC_DETERMINE;
+        petsc!(MatCreateShell(comm.as_raw(), rows, columns, all, all, data, &mut shell.0))?;
+        petsc!(MatShellSetContextDestroy(shell.0, Some(destroy)))?;
+        let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode =
+            multiply;
+        // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls this one,
+        // by its place among the operations, as what it is.
+        let multiply = unsafe {
+            std::mem::transmute::<
+                unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode,
+                unsafe extern "C" fn(),
+            >(multiply)
+        };
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT, Some(multiply)))?;
+        Ok(Some(shell))
+    }
+}
+
+impl Drop for Shell {
+    fn drop(&mut self) {
+        if !self.0.is_null() && running() {
+            // SAFETY: this reference is ours; solvers hold their own.
+            unsafe { sys::MatDestroy(&mut self.0) };
+        }
+    }
+}
+
+/// What the shell multiplies by: a matrix in single precision, renewed when its values change.
+struct Product {
+    matrix: Object<sys::Mat>,
+    /// Of the matrix when it was copied.
+    state: sys::PetscObjectState,
+    own: Part,
+    halo: Option<Halo>,
+}
+
+/// A sequential matrix in compressed rows, part of the matrix, and its copy.
+struct Part {
+    source: sys::Mat,
+    blocks: Blocks,
+}
+
+/// What other ranks' unknowns contribute.
+struct Halo {
+    part: Part,
+    scatter: Object<sys::VecScatter>,
+    ghosts: Object<sys::Vec>,
+}
+
+impl Product {
+    fn of(matrix: sys::Mat, comm: &SimpleCommunicator) -> Result<Option<Self>> {
+        let (mut own, mut other, mut map) = (matrix, null_mut(), null());
+        if is_type(matrix.cast(), sys::MATMPIAIJ)? {
+            petsc!(MatMPIAIJGetSeqAIJ(matrix, &mut own, &mut other, &mut map))?;
+        }
+        let mut size = 0;
+        petsc!(MatGetBlockSize(matrix, &mut size))?;
+        let size = if size % 3 == 0 { 3 } else { size as usize };
+        let own = Part::of(own, size)?;
+        let halo = if other.is_null() { None } else { Some(ghost_blocks(other, map, size)?) };
+        let mine = own.is_some() && !matches!(halo, Some(None));
+        let mut everywhere = false;
+        comm.all_reduce_into(&mine, &mut everywhere, SystemOperation::logical_and());
+        let (true, Some(own)) = (everywhere, own) else { return Ok(None) };
+        let halo = halo.flatten().map(|(part, blocks)| Halo::of(matrix, part, size, &blocks));
+        petsc!(PetscObjectReference(matrix.cast()))?;
+        let matrix = Object(matrix);
+        let mut product = Product { matrix, state: -1, own, halo: halo.transpose()? };
+        product.renew()?;
+        Ok(Some(product))
+    }
+
+    /// Copies the values if they have changed.
+    fn renew(&mut self) -> Result<()> {
+        let mut state = 0;
+        petsc!(PetscObjectStateGet(self.matrix.0.cast(), &mut state))?;
+        if state != self.state {
+            self.own.renew()?;
+            if let Some(halo) = &mut self.halo {
+                halo.part.renew()?;
+            }
+            self.state = state;
+        }
+        Ok(())
+    }
+
+    /// y = A x; the ghosts' values travel while the own part is multiplied.
+    fn multiply(&mut self, x: sys::Vec, y: sys::Vec) -> Result<()> {
+        self.renew()?;
+        let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
+        if let Some(halo) = &self.halo {
+            petsc!(VecScatterBegin(halo.scatter.0, x, halo.ghosts.0, insert, forward))?;
+        }
+        {
+            // SAFETY: PETSc's vectors live through the call and are distinct, as `MatMult` asks.
+            let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
+            self.own.blocks.multiply(&x, &mut y);
+        }
+        if let Some(halo) = &self.halo {
+            petsc!(VecScatterEnd(halo.scatter.0, x, halo.ghosts.0, insert, forward))?;
+            // SAFETY: as above; the ghosts are this object's.
+            let (ghosts, mut y) = unsafe { (Values::of(halo.ghosts.0)?, ValuesMut::of(y)?) };
+            halo.part.blocks.multiply_add(&ghosts, &mut y);
+        }
+        Ok(())
+    }
+}
+
+impl Part {
+    fn of(source: sys::Mat, size: usize) -> Result<Option<Self>> {
+        let rows = Rows::of(source)?;
+        let (offsets, columns) = rows.pattern();
+        Ok(Blocks::of_pattern(size, offsets, columns).map(|blocks| Part { source, blocks }))
+    }
+
+    fn renew(&mut self) -> Result<()> {
+        let rows = Rows::of(self.source)?;
+        let (offsets, columns) = rows.pattern();
+        let mut values = null();
+        petsc!(MatSeqAIJGetArrayRead(self.source, &mut values))?;
+        if !columns.is_empty() {
+            // SAFETY: as many values as columns, read only until the restore below.
+            let values = unsafe { std::slice::from_raw_parts(values, columns.len()) };
+            self.blocks.fill(offsets, values);
+        }
+        petsc!(MatSeqAIJRestoreArrayRead(self.source, &mut values))
+    }
+}
+
+/// The part of other ranks' unknowns and which global blocks those are; `None` where they do not
+/// come in whole blocks.
+fn ghost_blocks(
+    other: sys::Mat,
+    map: *const sys::PetscInt,
+    size: usize,
+) -> Result<Option<(Part, Vec<sys::PetscInt>)>> {
+    let (mut rows, mut count) = (0, 0);
+    petsc!(MatGetLocalSize(other, &mut rows, &mut count))?;
+    let map = if count == 0 {
+        &[][..]
+    } else {
+        // SAFETY: PETSc's list of the global column of each of the `count` columns.
+        unsafe { std::slice::from_raw_parts(map, count as usize) }
+    };
+    let whole = |run: &[sys::PetscInt]| {
+        run.len() == size
+            && (run[0] as usize).is_multiple_of(size)
+            && run.iter().zip(run[0]..).all(|(&column, expected)| column == expected)
+    };
+    if !map.chunks(size).all(whole) {
+        return Ok(None);
+    }
+    let blocks = map.chunks(size).map(|run| run[0] / size as sys::PetscInt).collect();
+    Ok(Part::of(other, size)?.map(|part| (part, blocks)))
+}
+
+impl Halo {
+    fn of(matrix: sys::Mat, part: Part, size: usize, blocks: &[sys::PetscInt]) -> Result<Self> {
+        let (mut wanted, mut own) = (Object(null_mut()), Object(null_mut()));
+        let (mut ghosts, mut scatter) = (Object(null_mut()), Object(null_mut()));
+        // SAFETY: a constant of a running MPI.
+        let alone = unsafe { mpi::ffi::RSMPI_COMM_SELF };
+        let (size, count) = (index(size)?, index(blocks.len())?);
+        let copy = sys::PETSC_COPY_VALUES;
+        petsc!(ISCreateBlock(alone, size, count, blocks.as_ptr(), copy, &mut wanted.0))?;
+        petsc!(MatCreateVecs(matrix, &mut own.0, null_mut()))?;
+        petsc!(MatCreateVecs(part.source, &mut ghosts.0, null_mut()))?;
+        petsc!(VecScatterCreate(own.0, wanted.0, ghosts.0, null_mut(), &mut scatter.0))?;
+        let _: (Object<sys::IS>, Object<sys::Vec>) = (wanted, own);
+        Ok(Halo { part, scatter, ghosts })
+    }
+}
+
+/// The pattern of a sequential matrix in compressed rows, borrowed.
+struct Rows {
+    source: sys::Mat,
+    count: sys::PetscInt,
+    offsets: *const sys::PetscInt,
+    columns: *const sys::PetscInt,
+}
+
+impl Rows {
+    fn of(source: sys::Mat) -> Result<Self> {
+        let mut rows = Rows { source, count: 0, offsets: null(), columns: null() };
+        rows.pass(sys::MatGetRowIJ).map(|()| rows)
+    }
+
+    /// The functions that lend and take back have the same arguments.
+    fn pass(&mut self, function: GetRows) -> Result<()> {
+        let (no, mut done) = (sys::PETSC_FALSE, sys::PETSC_FALSE);
+        let (count, offsets, columns) = (&mut self.count, &mut self.offsets, &mut self.columns);
+        // SAFETY: a live matrix, and places for the answers.
+        let code = unsafe { function(self.source, 0, no, no, count, offsets, columns, &mut done) };
+        check(code, "MatGetRowIJ")
+    }
+
+    /// Offsets of the rows, and columns.
+    fn pattern(&self) -> (&[sys::PetscInt], &[sys::PetscInt]) {
+        if self.offsets.is_null() {
+            return (&[], &[]);
+        }
+        // SAFETY: PETSc lends `count + 1` offsets, and as many columns as the last of them says.
+        unsafe {
+            let offsets = std::slice::from_raw_parts(self.offsets, self.count as usize + 1);
+            let entries = offsets[self.count as usize] as usize;
+            if entries == 0 || self.columns.is_null() {
+                return (offsets, &[]);
+            }
+            (offsets, std::slice::from_raw_parts(self.columns, entries))
+        }
+    }
+}
+
+type GetRows = unsafe extern "C" fn(
+    sys::Mat,
+    sys::PetscInt,
+    sys::PetscBool,
+    sys::PetscBool,
+    *mut sys::PetscInt,
+    *mut *const sys::PetscInt,
+    *mut *const sys::PetscInt,
+    *mut sys::PetscBool,
+) -> sys::PetscErrorCode;
+
+impl Drop for Rows {
+    fn drop(&mut self) {
+        // An error here would be the matrix's end, which its users will meet.
+        let _ = self.pass(sys::MatRestoreRowIJ);
+    }
+}
+
+/// One reference to a PETSc object.
+struct Object<T: Handle>(T);
+
+trait Handle: Copy {
+    fn object(self) -> sys::PetscObject;
+}
+
+macro_rules! handles {
+    ($($name:ty),*) => {
+        $(impl Handle for $name {
+            fn object(self) -> sys::PetscObject {
+                self.cast()
+            }
+        })*
+    };
+}
+handles!(sys::Mat, sys::Vec, sys::IS, sys::VecScatter);
+
+impl<T: Handle> Drop for Object<T> {
+    fn drop(&mut self) {
+        let mut object = self.0.object();
+        if !object.is_null() && running() {
+            // SAFETY: this reference is ours.
+            unsafe { sys::PetscObjectDestroy(&mut object) };
+        }
+    }
+}
+
+// A panic cannot pass the C code below these functions: `extern "C"` turns it into an abort.
+
+unsafe extern "C" fn multiply(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
+    let mut data: *mut c_void = null_mut();
+    let outcome = petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
+        // SAFETY: the context that `Shell::of` gave; PETSc multiplies by one matrix at a time.
+        let product = unsafe { &mut *data.cast::<Product>() };
+        product.multiply(x, y)
+    });
+    outcome.map_or_else(|error| keep(&error), |()| 0)
+}
+
+unsafe extern "C" fn destroy(data: *mut c_void) -> sys::PetscErrorCode {
+    // SAFETY: the box that `Shell::of` gave up, and PETSc calls this once.
+    drop(unsafe { Box::from_raw(data.cast::<Product>()) });
+    0
+}
