@@ -1,11 +1,11 @@
 //! P = L L^T ~ M on the sparsity of M (Cholesky without fill): the preconditioner of the mass.
 //!
 //! The mass is well conditioned but for cut cells, whose few small values the factor takes up.
-//! It serves lattices and meshes alike. One factor spans all ranks (Hysom and Pothen, SIAM J. Sci.
-//! Comput. 22 (2001) 2194): each rank eliminates its inner nodes first, which meet no node of
-//! another rank, all ranks at once; then the nodes on the border, rank after rank in an order that
-//! keeps the chains of ranks that wait for each other short. So no coupling is left out, and the
-//! iterations hardly depend on the number of ranks.
+//! It serves lattices and meshes alike. One factor spans all ranks (after Hysom and Pothen, SIAM
+//! J. Sci. Comput. 22 (2001) 2194): each rank eliminates its inner nodes first, which meet no node
+//! of another rank, all ranks at once; then the nodes on the border, rank after rank in an order
+//! that keeps the chains of ranks that wait for each other short. So no coupling is left out, and
+//! the iterations hardly depend on the number of ranks.
 
 use std::ops::Range;
 

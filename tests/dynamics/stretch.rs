@@ -45,7 +45,7 @@ fn the_stabilised_mass_moves_points_exactly_and_the_lumped_one_does_not() {
 
 /// The same figures in space: exact by the stabilised mass, and as far off by the lumped one.
 #[test]
-fn exact_in_space_on_one_rank_and_two() {
+fn exact_in_space_on_one_rank_to_four() {
     let stretch = |mass: &str, velocity: &str, ranks: usize| {
         Run::of("stretching-ghost-3d")
             .ranks(ranks)
@@ -56,7 +56,9 @@ fn exact_in_space_on_one_rank_and_two() {
             .set("output.fields=[\"deformation_gradient\"]")
             .results()
     };
-    for (velocity, ranks) in [("flip", 1), ("pic", 1), ("flip", 2)] {
+    for (velocity, ranks) in
+        [("flip", 1), ("pic", 1), ("flip", 2), ("pic", 2), ("pic", 3), ("pic", 4)]
+    {
         let run = stretch("consistent", velocity, ranks);
         assert!(run.verify("displacement_error") < 1e-12, "{velocity}, {ranks} ranks");
         assert!(run.verify("volume_ratio_error") < 1e-11, "{velocity}, {ranks} ranks");
