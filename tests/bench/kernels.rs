@@ -142,6 +142,8 @@ struct Costs {
     contribution: Sample,
     assemble: Sample,
     evaluate: Sample,
+    /// Per step: the empty matrix, and what the equations prepare.
+    matrix: Sample,
     force: Sample,
     conditions: Sample,
     product: Sample,
@@ -174,9 +176,9 @@ fn main() {
     );
     println!(
         "| case | points | nodes each | basis | system | stress + tangent | assembly | evaluation | \
-         force alone | conditions | update | all but the solve, per iteration |"
+         force alone | conditions | update | matrix | all but the solve, per iteration |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for case in CASES.iter().filter(|case| wanted(case.name)) {
         row(case.name, &costs(&world, case));
     }
@@ -211,7 +213,17 @@ fn elastic(name: &'static str, dimension: usize, basis: &'static str, cells: usi
 
 fn print_limits(case: &str, c: &Costs, machine: &Machine) {
     let numbers = &c.numbers;
-    println!("  {case}: {} points, {numbers:.2?}", c.points);
+    println!(
+        "  {case}: {} points; per point {:.2} nodes, {:.3} groups, {:.2} places, {:.3} cells, {:.3} \
+         active nodes, {:.2} blocks",
+        c.points,
+        numbers.nodes,
+        numbers.groups,
+        numbers.places,
+        numbers.cells,
+        numbers.active,
+        numbers.blocks
+    );
     for (count, sample) in [
         (numbers.basis(), c.basis),
         (numbers.system(), c.system),
@@ -226,7 +238,7 @@ fn print_limits(case: &str, c: &Costs, machine: &Machine) {
 
 fn row(name: &str, c: &Costs) {
     println!(
-        "| {name} | {} | {:.2} | {} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
+        "| {name} | {} | {:.2} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
         c.points,
         c.nodes_per_point,
         c.basis,
@@ -237,6 +249,7 @@ fn row(name: &str, c: &Costs) {
         c.force,
         c.conditions,
         c.update,
+        c.matrix,
         c.per_iteration()
     );
 }
@@ -334,10 +347,18 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     };
     let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
     let owned = numbering.owned * D;
-    let mut problem =
-        Equilibrium::new(world, &mesh, step, &conditions, &left_out, vec![0.0; owned], settings)?;
-    let values = vec![0.0; mesh.pattern.ghost_start * D * D];
-    let mut matrix = solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)?;
+    let empty = || {
+        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
+        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
+    };
+    let equations = || {
+        let external = vec![0.0; owned];
+        Equilibrium::new(world, &mesh, step, &conditions, &left_out, external, settings)
+    };
+    let matrix_cost = sample(count, || {
+        black_box((empty().is_ok(), equations().is_ok()));
+    });
+    let (mut problem, mut matrix) = (equations()?, empty()?);
     let mut f = vec![0.0; owned];
     let [evaluate, conditioned, force] = sample_parts(count, |part| {
         let x = &displacement[..owned];
@@ -383,6 +404,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         contribution,
         assemble,
         evaluate,
+        matrix: matrix_cost,
         force,
         conditions: conditioned,
         product,
