@@ -88,6 +88,15 @@ impl Places {
         Ok(places)
     }
 
+    /// Stored positions.
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
     #[inline]
     pub fn of(&self, support: usize) -> Place<'_> {
         Place {

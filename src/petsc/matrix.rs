@@ -79,30 +79,57 @@ impl Matrix {
         petsc!(MatSetSizes(matrix.raw, n, n, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
         petsc!(MatSetBlockSize(matrix.raw, block))?;
         petsc!(MatSetType(matrix.raw, sys::MATAIJ.as_ptr().cast()))?;
-        // Each of the two does nothing on a matrix of the other type.
-        let (rows, cols, vals) = (row_offsets.as_ptr(), columns.as_ptr(), values.as_ptr());
-        petsc!(MatSeqAIJSetPreallocationCSR(matrix.raw, rows, cols, vals))?;
-        petsc!(MatMPIAIJSetPreallocationCSR(matrix.raw, rows, cols, vals))?;
+        matrix.set_pattern(columns, own)?;
         // With these two the later assemblies need no communication.
         petsc!(MatSetOption(matrix.raw, sys::MAT_NO_OFF_PROC_ENTRIES, sys::PETSC_TRUE))?;
         petsc!(MatSetOption(matrix.raw, sys::MAT_NEW_NONZERO_LOCATIONS, sys::PETSC_FALSE))?;
-        matrix.find_split(columns, own)?;
+        matrix.update(values)?;
+        matrix.check_split()?;
         Ok(matrix)
     }
 
-    /// Where each row is cut between the two matrices of PETSc's parallel format.
-    fn find_split(&mut self, columns: &[i32], own: std::ops::Range<usize>) -> Result<()> {
-        let Some((diagonal, other)) = self.parts()? else { return Ok(()) };
-        self.split.reserve_exact(self.rows);
-        for row in self.row_offsets.windows(2) {
-            let columns = &columns[row[0]..row[1]];
-            let left = columns.partition_point(|&c| (c as usize) < own.start);
-            let end = columns.partition_point(|&c| (c as usize) < own.end);
-            self.split.push((left as u32, (end - left) as u32));
+    /// Hands PETSc the columns as they will be stored: entered row by row they would be searched
+    /// for and sorted once more. `own`: columns of this rank.
+    fn set_pattern(&mut self, columns: &[i32], own: std::ops::Range<usize>) -> Result<()> {
+        let rows = || self.row_offsets.windows(2).map(|row| &columns[row[0]..row[1]]);
+        let split: Vec<(u32, u32)> = rows()
+            .map(|columns| {
+                let left = columns.partition_point(|&c| (c as usize) < own.start);
+                let end = columns.partition_point(|&c| (c as usize) < own.end);
+                (left as u32, (end - left) as u32)
+            })
+            .collect();
+        let inside: Vec<i32> = split.iter().map(|split| split.1 as i32).collect();
+        let outside: Vec<i32> =
+            rows().zip(&inside).map(|(columns, inside)| columns.len() as i32 - inside).collect();
+        // Each of the two does nothing on a matrix of the other type.
+        petsc!(MatSeqAIJSetPreallocation(self.raw, 0, inside.as_ptr()))?;
+        petsc!(MatMPIAIJSetPreallocation(self.raw, 0, inside.as_ptr(), 0, outside.as_ptr()))?;
+        match self.parts()? {
+            // PETSc copies the numbers, whatever its signature says.
+            None => petsc!(MatSeqAIJSetColumnIndices(self.raw, columns.as_ptr().cast_mut())),
+            Some((diagonal, other)) => {
+                let (mut here, mut elsewhere) = (Vec::new(), Vec::new());
+                for (columns, &(left, count)) in rows().zip(&split) {
+                    let (left, rest) = columns.split_at(left as usize);
+                    let (inside, right) = rest.split_at(count as usize);
+                    here.extend(inside.iter().map(|&c| c - own.start as i32));
+                    elsewhere.extend_from_slice(left);
+                    elsewhere.extend_from_slice(right);
+                }
+                petsc!(MatSeqAIJSetColumnIndices(diagonal, here.as_mut_ptr()))?;
+                petsc!(MatSeqAIJSetColumnIndices(other, elsewhere.as_mut_ptr()))?;
+                self.split = split;
+                Ok(())
+            }
         }
+    }
+
+    /// Whether PETSc's parallel format holds the two parts of the rows as they were given.
+    fn check_split(&self) -> Result<()> {
+        let Some((diagonal, other)) = self.parts()? else { return Ok(()) };
         let inside: usize = self.split.iter().map(|s| s.1 as usize).sum();
-        let total = self.row_offsets.last().copied().unwrap_or(0);
-        if stored(diagonal)? != inside || stored(other)? != total - inside {
+        if stored(diagonal)? != inside || stored(other)? != self.entries_local() - inside {
             return Err(Error::Environment(
                 "PETSc stored a matrix with another pattern than the one it was given".into(),
             ));

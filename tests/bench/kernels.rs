@@ -1,13 +1,17 @@
 //! Nanoseconds per point of each part of a step, on one core, beside the machine's limits.
 //!
-//! `cargo bench --bench kernels [-- WORDS]`: the cases whose names hold one of the words.
+//! `cargo bench --bench kernels [-- WORDS]`: the cases whose names hold one of the words; `size`:
+//! cost against size; `limits`: larger cases, phase by phase beside what the machine would need.
 
+mod counts;
 mod limits;
 mod report;
 
 use std::hint::black_box;
 use std::path::Path;
 
+use counts::Numbers;
+use limits::Machine;
 use mpm_par::analysis::discretise::{Discretisation, Model};
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
 use mpm_par::analysis::{setup, solver, update};
@@ -92,6 +96,9 @@ const CASES: [Case; 6] = [
 /// Cost against size: 2D gimp, elastic, 1e4 to 1e6 points.
 const SIZES: [usize; 3] = [50, 158, 500];
 
+/// Cells per side of the cases held against the machine's limits: their systems fill no cache.
+const LARGE: [(usize, &str, usize); 3] = [(2, "gimp", 350), (3, "mpm", 40), (3, "gimp", 28)];
+
 impl Case {
     /// A block of material away from the grid's edges, its points off the cells' middles by
     /// 0.13 h, so that domains cross grid lines as often as they do after some steps.
@@ -135,15 +142,20 @@ struct Costs {
     contribution: Sample,
     assemble: Sample,
     evaluate: Sample,
-    split: Sample,
+    /// Per step: the empty matrix, and what the equations prepare.
+    matrix: Sample,
+    force: Sample,
+    conditions: Sample,
+    product: Sample,
     update: Sample,
+    numbers: Numbers,
 }
 
 impl Costs {
     /// Everything but the linear solve, per Newton iteration.
     fn per_iteration(&self) -> f64 {
         self.evaluate.median
-            + self.split.median
+            + self.conditions.median
             + (self.system.median + self.update.median) / ITERATIONS_PER_STEP
     }
 }
@@ -157,33 +169,23 @@ fn main() {
     let world = World::new(universe.world());
 
     println!("machine: {}", machine());
-    println!("triad bandwidth of one core: {:.1} GB/s", limits::triad());
-    for peak in limits::peaks() {
-        println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
-    }
+    let machine = limits::measured();
     println!(
         "\nns per point, median (least) of {} runs; basis, system, update: per step",
         report::RUNS
     );
     println!(
-        "| case | points | nodes each | basis | system | stress+tangent | assembly | evaluation | split | update | all but the solve, per iteration |"
+        "| case | points | nodes each | basis | system | stress + tangent | assembly | evaluation | \
+         force alone | conditions | update | matrix | all but the solve, per iteration |"
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|");
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for case in CASES.iter().filter(|case| wanted(case.name)) {
         row(case.name, &costs(&world, case));
     }
     if wanted("size") {
         println!("\ncost against size, 2D gimp, elastic; memory as resident bytes gained");
         for cells in SIZES {
-            let case = Case {
-                name: "size",
-                dimension: 2,
-                basis: "gimp",
-                plastic: false,
-                cells,
-                per_cell: 2,
-            };
-            let costs = costs(&world, &case);
+            let costs = costs(&world, &elastic("size", 2, "gimp", cells));
             row("size", &costs);
             println!(
                 "  memory: {:.0} bytes per point, {:.0} bytes per active node (system)",
@@ -191,11 +193,52 @@ fn main() {
             );
         }
     }
+    if wanted("limits") {
+        println!("\nbeside the machine's limits: least ns, bytes and operations per point");
+        counts::print_head();
+        for (dimension, basis, cells) in LARGE {
+            let name = format!("{dimension}D {basis}");
+            print_limits(
+                &name,
+                &costs(&world, &elastic("limits", dimension, basis, cells)),
+                &machine,
+            );
+        }
+    }
+}
+
+fn elastic(name: &'static str, dimension: usize, basis: &'static str, cells: usize) -> Case {
+    Case { name, dimension, basis, plastic: false, cells, per_cell: 2 }
+}
+
+fn print_limits(case: &str, c: &Costs, machine: &Machine) {
+    let numbers = &c.numbers;
+    println!(
+        "  {case}: {} points; per point {:.2} nodes, {:.3} groups, {:.2} places, {:.3} cells, {:.3} \
+         active nodes, {:.2} blocks",
+        c.points,
+        numbers.nodes,
+        numbers.groups,
+        numbers.places,
+        numbers.cells,
+        numbers.active,
+        numbers.blocks
+    );
+    for (count, sample) in [
+        (numbers.basis(), c.basis),
+        (numbers.system(), c.system),
+        (numbers.contribution(), c.contribution),
+        (numbers.evaluation(), c.evaluate),
+        (numbers.product(), c.product),
+        (numbers.update(), c.update),
+    ] {
+        counts::print(case, &count, sample.least, machine);
+    }
 }
 
 fn row(name: &str, c: &Costs) {
     println!(
-        "| {name} | {} | {:.2} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
+        "| {name} | {} | {:.2} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {:.0} |",
         c.points,
         c.nodes_per_point,
         c.basis,
@@ -203,8 +246,10 @@ fn row(name: &str, c: &Costs) {
         c.contribution,
         c.assemble,
         c.evaluate,
-        c.split,
+        c.force,
+        c.conditions,
         c.update,
+        c.matrix,
         c.per_iteration()
     );
 }
@@ -302,21 +347,33 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     };
     let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
     let owned = numbering.owned * D;
-    let mut problem =
-        Equilibrium::new(world, &mesh, step, &conditions, &left_out, vec![0.0; owned], settings)?;
-    let values = vec![0.0; mesh.pattern.ghost_start * D * D];
-    let mut matrix = solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)?;
+    let empty = || {
+        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
+        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
+    };
+    let equations = || {
+        let external = vec![0.0; owned];
+        Equilibrium::new(world, &mesh, step, &conditions, &left_out, external, settings)
+    };
+    let matrix_cost = sample(count, || {
+        black_box((empty().is_ok(), equations().is_ok()));
+    });
+    let (mut problem, mut matrix) = (equations()?, empty()?);
     let mut f = vec![0.0; owned];
-    let [evaluate, split] = sample_parts(count, |part| {
+    let [evaluate, conditioned, force] = sample_parts(count, |part| {
         let x = &displacement[..owned];
         match part {
             0 => {
                 let sound = problem.residual_and_matrix(x, &mut f, &mut matrix);
                 assert!(sound.is_ok_and(|sound| sound));
             }
-            _ => problem.jacobian(x, &mut matrix).expect("the matrix has its pattern"),
+            1 => problem.jacobian(x, &mut matrix).expect("the matrix has its pattern"),
+            _ => assert!(problem.residual(x, &mut f).is_ok_and(|sound| sound)),
         }
     });
+    let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);
+    x.values_mut()?.copy_from_slice(&displacement[..owned]);
+    let product = sample(count, || matrix.mult(&x, &mut y).expect("sizes fit"));
     let bytes_system = resident_bytes() - before;
     drop(problem);
 
@@ -347,9 +404,36 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         contribution,
         assemble,
         evaluate,
-        split,
+        matrix: matrix_cost,
+        force,
+        conditions: conditioned,
+        product,
         update,
+        numbers: numbers(case, &mesh),
     })
+}
+
+/// What the counts are made from.
+fn numbers<const D: usize>(case: &Case, mesh: &Discretisation<D>) -> Numbers {
+    let per_point = |count: usize| count as f64 / mesh.influences.len() as f64;
+    let groups = &mesh.groups;
+    let squares = |lengths: &mut dyn Iterator<Item = usize>| lengths.map(|n| n * n).sum::<usize>();
+    let points = &mut (0..mesh.influences.len()).map(|p| mesh.influences.row(p).len());
+    let all_groups = &mut (0..groups.len()).map(|g| groups.nodes(g).len());
+    Numbers {
+        dimension: D,
+        gimp: case.basis == "gimp",
+        plastic: case.plastic,
+        nodes: per_point(mesh.influences.nodes.len()),
+        pairs: per_point(squares(points)),
+        groups: per_point(groups.len()),
+        group_nodes: per_point(groups.nodes.len()),
+        group_pairs: per_point(squares(all_groups)),
+        places: per_point(mesh.pattern.places.len()),
+        cells: per_point(mesh.populated.reached.len()),
+        active: per_point(mesh.numbering.len()),
+        blocks: per_point(mesh.pattern.columns.len()),
+    }
 }
 
 /// Moves all points by 0.13 h along each axis.

@@ -11,6 +11,31 @@ pub struct Peak {
     pub gflops: f64,
 }
 
+/// The limits that phases are held against.
+#[derive(Debug, Clone, Copy)]
+pub struct Machine {
+    /// GB/s of one core.
+    pub triad: f64,
+    /// GFLOP/s of the baseline instruction set, which all but the assembly is compiled for.
+    pub baseline: f64,
+    /// GFLOP/s of the widest set that the assembly has a form for.
+    pub wide: f64,
+}
+
+/// Measures the limits and prints them.
+#[allow(dead_code)]
+pub fn measured() -> Machine {
+    let triad = triad();
+    println!("triad bandwidth of one core: {triad:.1} GB/s");
+    let peaks = peaks();
+    for peak in &peaks {
+        println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
+    }
+    let of = |name: &str| peaks.iter().find(|peak| peak.name == name).map(|peak| peak.gflops);
+    let baseline = of("baseline").unwrap_or(f64::NAN);
+    Machine { triad, baseline, wide: of("avx2+fma").unwrap_or(baseline) }
+}
+
 /// Triad bandwidth of one core, GB/s, counting three arrays once each (best of several passes).
 pub fn triad() -> f64 {
     const LENGTH: usize = 12_000_000;
