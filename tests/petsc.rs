@@ -500,7 +500,7 @@ fn blocks_in_single_precision_multiply_like_the_rows_they_come_from() {
         for (k, value) in values.iter_mut().enumerate() {
             *value *= 1.0 + (k as f64 * 0.7).sin() / 3.0;
         }
-        let mut blocks = Blocks::of_pattern(block, &offsets, &columns).unwrap();
+        let mut blocks = Blocks::of_pattern([block; 2], &offsets, &columns).unwrap();
         blocks.fill(&offsets, &values);
         let x: Vec<f64> = (0..rows).map(|k| (k as f64 * 1.3).cos()).collect();
         let (mut fast, mut plain, mut sum) = (vec![f64::NAN; rows], vec![7.0; rows], x.clone());
@@ -521,22 +521,58 @@ fn blocks_in_single_precision_multiply_like_the_rows_they_come_from() {
             .chain(offsets.iter().copied())
             .chain(std::iter::repeat_n(offsets[rows], block))
             .collect();
-        let mut blocks = Blocks::of_pattern(block, &empty, &columns).unwrap();
+        let mut blocks = Blocks::of_pattern([block; 2], &empty, &columns).unwrap();
         blocks.fill(&empty, &values);
         let mut shifted = vec![f64::NAN; rows + 3 * block];
         blocks.multiply(&x, &mut shifted);
         assert_eq!(shifted[2 * block..2 * block + rows], fast);
         assert!(shifted[..2 * block].iter().chain(&shifted[2 * block + rows..]).all(|&v| v == 0.0));
         // What is not made of whole blocks, of the same in all rows of a block, or of this size.
-        assert!(Blocks::of_pattern(block, &offsets[..rows], &columns).is_none());
-        assert!(Blocks::of_pattern(1, &offsets, &columns).is_none());
+        assert!(Blocks::of_pattern([block; 2], &offsets[..rows], &columns).is_none());
+        assert!(Blocks::of_pattern([1, 1], &offsets, &columns).is_none());
         let mut other = columns.clone();
         other[block] += block as i32;
-        assert!(Blocks::of_pattern(block, &offsets, &other).is_none());
+        assert!(Blocks::of_pattern([block; 2], &offsets, &other).is_none());
         other = columns.clone();
         other[0] += 1;
-        assert!(Blocks::of_pattern(block, &offsets, &other).is_none());
+        assert!(Blocks::of_pattern([block; 2], &offsets, &other).is_none());
     }
+}
+
+#[test]
+fn oblong_blocks_multiply_both_ways() {
+    // 5 block rows of 2 on 4 block columns of 3; the fourth row is empty.
+    let pattern: [&[usize]; 5] = [&[0, 2], &[1], &[0, 1, 2, 3], &[], &[3]];
+    let (mut offsets, mut columns) = (vec![0], Vec::new());
+    for row in pattern {
+        for _ in 0..2 {
+            columns.extend(row.iter().flat_map(|&block| (0..3).map(move |c| 3 * block as i32 + c)));
+            offsets.push(columns.len() as i32);
+        }
+    }
+    let values: Vec<f64> = (0..columns.len()).map(|k| (k as f64 * 0.9).sin()).collect();
+    let single = |k: usize| f64::from(values[k] as f32);
+    let mut blocks = Blocks::of_pattern([2, 3], &offsets, &columns).unwrap();
+    blocks.fill(&offsets, &values);
+    let (down, up): (Vec<f64>, Vec<f64>) =
+        ((0..12).map(|k| (k as f64).cos()).collect(), (0..10).map(|k| (k as f64).sin()).collect());
+    let (mut y, mut z) = (vec![0.0; 10], vec![0.0; 12]);
+    for r in 0..10 {
+        for k in offsets[r] as usize..offsets[r + 1] as usize {
+            y[r] += single(k) * down[columns[k] as usize];
+            z[columns[k] as usize] += single(k) * up[r];
+        }
+    }
+    let close = |a: &[f64], b: &[f64]| {
+        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14), "{a:?} {b:?}");
+    };
+    let (mut product, mut transposed) = (vec![f64::NAN; 10], vec![f64::NAN; 12]);
+    blocks.multiply(&down, &mut product);
+    close(&product, &y);
+    blocks.multiply_plain(&down, &mut product);
+    close(&product, &y);
+    blocks.multiply_transposed(&up, &mut transposed);
+    close(&transposed, &z);
 }
 
 /// x^3 + A x = 1 with [`membrane`]'s A.

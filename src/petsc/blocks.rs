@@ -1,82 +1,108 @@
-//! y = A x for a sparse A of square blocks, its values rounded to single precision: 4 bytes an
+//! y = A x for a sparse A of small blocks, its values rounded to single precision: 4 bytes an
 //! entry and 4 a block, where compressed rows take 12 an entry. Sums are in double precision.
-//! For multigrid's smoothers, which have to be fixed and symmetric, not exact.
+//! For multigrid's cycle, which has to be fixed and symmetric, not exact.
 
 /// The rows of one rank, or the part of them that multiplies other ranks' unknowns.
 #[derive(Debug, Clone)]
 pub struct Blocks {
-    /// Rows and columns of a block: 2 or 3.
-    size: usize,
+    shape: Shape,
     /// Block rows with entries, where some have none.
     rows: Option<Vec<u32>>,
     /// First block of each row of `rows`, and the end.
     offsets: Vec<u32>,
     /// Block column of each block.
     columns: Vec<u32>,
-    /// Blocks of 2 by rows, blocks of 3 by columns; then one value that is loaded and never used.
+    /// Squares of 2 by rows, others by columns; then one value that is loaded and never used.
     values: Vec<f32>,
+}
+
+/// Rows and columns of a block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Shape {
+    Two,
+    Three,
+    /// 2 rows, 3 columns: from rigid-body modes of the plane to displacements.
+    TwoByThree,
 }
 
 /// Loaded in fours, the last column of the last block reads one value beyond it.
 const BEYOND: usize = 1;
 
+/// Bytes of values between what is used and what is asked for: the rows are too short for the
+/// processor to foresee the next ones.
+const AHEAD: usize = 8192;
+
+impl Shape {
+    fn of(size: [usize; 2]) -> Option<Self> {
+        match size {
+            [2, 2] => Some(Shape::Two),
+            [3, 3] => Some(Shape::Three),
+            [2, 3] => Some(Shape::TwoByThree),
+            _ => None,
+        }
+    }
+}
+
+/// Calls a method for the blocks' rows and columns.
+macro_rules! by_shape {
+    ($blocks:expr, $method:ident[$($flag:tt),*]($($argument:expr),*)) => {
+        match $blocks.shape {
+            Shape::Two => $blocks.$method::<2, 2, $($flag),*>($($argument),*),
+            Shape::Three => $blocks.$method::<3, 3, $($flag),*>($($argument),*),
+            Shape::TwoByThree => $blocks.$method::<2, 3, $($flag),*>($($argument),*),
+        }
+    };
+}
+
 impl Blocks {
     /// The pattern of compressed rows (`offsets` of each scalar row, ascending `columns`) in blocks
-    /// of `size`, with values zero; `None` where it is not made of whole blocks.
-    pub fn of_pattern(size: usize, offsets: &[i32], columns: &[i32]) -> Option<Self> {
+    /// of `size` rows and columns, 2x2, 3x3 or 2x3, with values zero; `None` where it is not made
+    /// of whole blocks.
+    pub fn of_pattern(size: [usize; 2], offsets: &[i32], columns: &[i32]) -> Option<Self> {
+        let shape = Shape::of(size)?;
+        let [tall, wide] = size;
         let count = offsets.len().saturating_sub(1);
-        if !(2..=3).contains(&size) || !count.is_multiple_of(size) {
+        if !count.is_multiple_of(tall) {
             return None;
         }
         let row = |r: usize| columns.get(offsets[r] as usize..offsets[r + 1] as usize);
         let mut rows = Vec::new();
         let (mut starts, mut blocks) = (vec![0], Vec::new());
-        for first in (0..count).step_by(size) {
+        for first in (0..count).step_by(tall) {
             let pattern = row(first)?;
-            for run in pattern.chunks(size) {
-                let start = run[0];
-                let whole = run.len() == size
-                    && start >= 0
-                    && (start as usize).is_multiple_of(size)
-                    && run.iter().zip(start..).all(|(&column, expected)| column == expected);
-                if !whole {
-                    return None;
-                }
-                blocks.push(start as u32 / size as u32);
+            for run in pattern.chunks(wide) {
+                blocks.push(block_of(run, wide)? as u32);
             }
-            if (1..size).any(|k| row(first + k) != Some(pattern)) {
+            if (1..tall).any(|k| row(first + k) != Some(pattern)) {
                 return None;
             }
             if !pattern.is_empty() {
-                rows.push((first / size) as u32);
+                rows.push((first / tall) as u32);
                 starts.push(u32::try_from(blocks.len()).ok()?);
             }
         }
-        let values = vec![0.0; blocks.len() * size * size + BEYOND];
-        let rows = (rows.len() < count / size).then_some(rows);
-        Some(Blocks { size, rows, offsets: starts, columns: blocks, values })
+        let values = vec![0.0; blocks.len() * tall * wide + BEYOND];
+        let rows = (rows.len() < count / tall).then_some(rows);
+        Some(Blocks { shape, rows, offsets: starts, columns: blocks, values })
     }
 
     /// Rounds the `values` of the compressed rows of [`Self::of_pattern`], the same `offsets`.
     pub fn fill(&mut self, offsets: &[i32], values: &[f64]) {
-        match self.size {
-            2 => self.fill_of::<2>(offsets, values),
-            _ => self.fill_of::<3>(offsets, values),
-        }
+        by_shape!(self, fill_of[](offsets, values));
     }
 
-    fn fill_of<const B: usize>(&mut self, offsets: &[i32], values: &[f64]) {
+    fn fill_of<const R: usize, const C: usize>(&mut self, offsets: &[i32], values: &[f64]) {
         for (k, range) in self.offsets.windows(2).enumerate() {
             let row = self.rows.as_ref().map_or(k, |rows| rows[k] as usize);
-            let (first, end) = (range[0] as usize * B * B, range[1] as usize * B * B);
-            let width = (end - first) / B;
-            for r in 0..B {
-                let start = offsets[row * B + r] as usize;
-                let source = values[start..start + width].chunks_exact(B);
-                let target = self.values[first..end].chunks_exact_mut(B * B);
+            let (first, end) = (range[0] as usize * R * C, range[1] as usize * R * C);
+            let width = (end - first) / R;
+            for r in 0..R {
+                let start = offsets[row * R + r] as usize;
+                let source = values[start..start + width].chunks_exact(C);
+                let target = self.values[first..end].chunks_exact_mut(R * C);
                 for (target, source) in target.zip(source) {
                     for (c, &value) in source.iter().enumerate() {
-                        target[place::<B>(r, c)] = value as f32;
+                        target[place::<R, C>(r, c)] = value as f32;
                     }
                 }
             }
@@ -103,38 +129,72 @@ impl Blocks {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { avx2::run::<ADD>(self, x, y) };
         }
-        self.run_plain::<ADD>(x, y);
+        by_shape!(self, plain[ADD, false](x, y));
     }
 
     /// y = A x in the form without special instructions, which the other is tested against.
     #[doc(hidden)]
     pub fn multiply_plain(&self, x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
-        self.run_plain::<true>(x, y);
+        by_shape!(self, plain[true, false](x, y));
     }
 
-    fn run_plain<const ADD: bool>(&self, x: &[f64], y: &mut [f64]) {
-        match self.size {
-            2 => self.plain_of::<2, ADD>(x, y),
-            _ => self.plain_of::<3, ADD>(x, y),
-        }
-    }
-
-    fn plain_of<const B: usize, const ADD: bool>(&self, x: &[f64], y: &mut [f64]) {
-        let (x, y) = (x.as_chunks::<B>().0, y.as_chunks_mut::<B>().0);
+    #[inline(always)]
+    fn plain<const R: usize, const C: usize, const ADD: bool, const FUSED: bool>(
+        &self,
+        x: &[f64],
+        y: &mut [f64],
+    ) {
+        let (x, y) = (x.as_chunks::<C>().0, y.as_chunks_mut::<R>().0);
         for (k, range) in self.offsets.windows(2).enumerate() {
             let blocks = range[0] as usize..range[1] as usize;
-            let values = self.values[blocks.start * B * B..].chunks_exact(B * B);
-            let mut sums = [0.0; B];
+            let values = self.values[blocks.start * R * C..].chunks_exact(R * C);
+            let mut sums = [0.0; R];
             for (&column, block) in self.columns[blocks].iter().zip(values) {
+                fetch(block, AHEAD);
                 let x = &x[column as usize];
-                for r in 0..B {
-                    for c in 0..B {
-                        sums[r] += f64::from(block[place::<B>(r, c)]) * x[c];
+                for c in 0..C {
+                    for (r, sum) in sums.iter_mut().enumerate() {
+                        let value = block[place::<R, C>(r, c)].into();
+                        *sum = multiply_add::<FUSED>(value, x[c], *sum);
                     }
                 }
             }
-            store::<B, ADD>(&mut y[self.row(k)], sums);
+            store::<R, ADD>(&mut y[self.row(k)], sums);
+        }
+    }
+
+    /// y = A^T x.
+    pub fn multiply_transposed(&self, x: &[f64], y: &mut [f64]) {
+        y.fill(0.0);
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has just said that it knows the instructions.
+            return unsafe { avx2::transposed(self, x, y) };
+        }
+        by_shape!(self, transposed[false](x, y));
+    }
+
+    #[inline(always)]
+    fn transposed<const R: usize, const C: usize, const FUSED: bool>(
+        &self,
+        x: &[f64],
+        y: &mut [f64],
+    ) {
+        let (x, y) = (x.as_chunks::<R>().0, y.as_chunks_mut::<C>().0);
+        for (k, range) in self.offsets.windows(2).enumerate() {
+            let blocks = range[0] as usize..range[1] as usize;
+            let values = self.values[blocks.start * R * C..].chunks_exact(R * C);
+            let x = &x[self.row(k)];
+            for (&column, block) in self.columns[blocks].iter().zip(values) {
+                fetch(block, AHEAD);
+                let y = &mut y[column as usize];
+                for (c, y) in y.iter_mut().enumerate() {
+                    for (r, &x) in x.iter().enumerate() {
+                        *y = multiply_add::<FUSED>(block[place::<R, C>(r, c)].into(), x, *y);
+                    }
+                }
+            }
         }
     }
 
@@ -145,35 +205,65 @@ impl Blocks {
     }
 }
 
+/// The block that `columns` are: `wide` in a row, from a multiple of it.
+pub fn block_of(columns: &[i32], wide: usize) -> Option<usize> {
+    let start = usize::try_from(*columns.first()?).ok()?;
+    let whole = columns.len() == wide
+        && start.is_multiple_of(wide)
+        && columns.iter().zip(start..).all(|(&column, expected)| column as usize == expected);
+    whole.then_some(start / wide)
+}
+
 /// Where a block keeps its entry (r, c).
 #[inline(always)]
-fn place<const B: usize>(r: usize, c: usize) -> usize {
-    if B == 2 { r * B + c } else { c * B + r }
+fn place<const R: usize, const C: usize>(r: usize, c: usize) -> usize {
+    if R == 2 && C == 2 { r * C + c } else { c * R + r }
 }
 
 #[inline(always)]
-fn store<const B: usize, const ADD: bool>(target: &mut [f64; B], sums: [f64; B]) {
+fn store<const R: usize, const ADD: bool>(target: &mut [f64; R], sums: [f64; R]) {
     for (target, sum) in target.iter_mut().zip(sums) {
         *target = if ADD { *target + sum } else { sum };
     }
 }
 
-/// With AVX2 and fused multiply-add: a block of 2, or a column of a block of 3, in one vector.
+/// a b + c, rounded once where the instruction set can.
+#[inline(always)]
+fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// Asks for what lies `ahead` bytes further on.
+#[inline(always)]
+fn fetch<T>(here: &[T], ahead: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a hint that reads nothing, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(here.as_ptr().cast::<i8>().wrapping_add(ahead)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (here, ahead);
+}
+
+/// With AVX2 and fused multiply-add: a square of 2, or a column of a square of 3, in one vector.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use super::{BEYOND, Blocks, store};
+    use super::{AHEAD, BEYOND, Blocks, Shape, fetch, store};
     use std::arch::x86_64::*;
-
-    /// Bytes of values between what is used and what is asked for: the rows are too short for the
-    /// processor to foresee the next ones.
-    const AHEAD: usize = 8192;
 
     #[target_feature(enable = "avx2,fma")]
     pub fn run<const ADD: bool>(blocks: &Blocks, x: &[f64], y: &mut [f64]) {
-        match blocks.size {
-            2 => twos::<ADD>(blocks, x, y),
-            _ => threes::<ADD>(blocks, x, y),
+        match blocks.shape {
+            Shape::Two => twos::<ADD>(blocks, x, y),
+            Shape::Three => threes::<ADD>(blocks, x, y),
+            Shape::TwoByThree => blocks.plain::<2, 3, ADD, true>(x, y),
         }
+    }
+
+    #[target_feature(enable = "avx2,fma")]
+    pub fn transposed(blocks: &Blocks, x: &[f64], y: &mut [f64]) {
+        by_shape!(blocks, transposed[true](x, y));
     }
 
     #[target_feature(enable = "avx2,fma")]
@@ -236,12 +326,5 @@ mod avx2 {
             unsafe { _mm256_storeu_pd(sums.as_mut_ptr(), sum) };
             store::<3, ADD>(&mut y[blocks.row(k)], [sums[0], sums[1], sums[2]]);
         }
-    }
-
-    /// Asks for what lies `ahead` bytes further on.
-    #[inline(always)]
-    fn fetch<T>(here: &[T], ahead: usize) {
-        // SAFETY: a hint that reads nothing, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(here.as_ptr().cast::<i8>().wrapping_add(ahead)) };
     }
 }

@@ -13,7 +13,8 @@ use crate::error::{Error, Result};
 /// Prefixes of the program's solvers: equilibrium, mass, extreme eigenvalues.
 const PREFIXES: [&str; 3] = ["qs_", "mass_", "kappa_"];
 /// Prefixes that PETSc puts before the options of solvers inside solvers.
-const NESTED: [&str; 9] = [
+const NESTED: [&str; 10] = [
+    "pc_gamg_esteig_",
     "telescope_",
     "mg_levels_",
     "mg_coarse_",

@@ -1,19 +1,20 @@
-//! Multigrid's smoothers on matrices in single precision.
+//! Multigrid's cycle on matrices in single precision.
 //!
-//! Chebyshev's method and the residual of a level only multiply by the level's matrix, which
-//! streams from memory: in [`Blocks`] it has less than half the bytes. The iteration outside keeps
-//! the exact matrix, so the answer is the same; the preconditioner stays fixed and symmetric.
+//! Chebyshev's method, the residual of a level and the transfer between levels only multiply by
+//! matrices that stream from memory: in [`Blocks`] they have less than half the bytes. The
+//! iteration outside keeps the exact matrix, so the answer is the same; the preconditioner stays
+//! fixed and symmetric.
 //! `-<prefix>mg_levels_single false` leaves PETSc's matrices in place.
 
-use std::ffi::c_void;
+use std::ffi::{CStr, c_void};
 use std::ptr::{null, null_mut};
 
 use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, CommunicatorCollectives};
 
-use super::blocks::Blocks;
-use super::check::{check, keep, petsc, running};
+use super::blocks::{Blocks, block_of};
+use super::check::{bool_of, check, keep, petsc, running};
 use super::sys;
 use super::vector::{Values, ValuesMut, index};
 use crate::error::Result;
@@ -27,6 +28,7 @@ pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
     if !is_type(pc.cast(), sys::PCGAMG)? || !wanted(ksp)? {
         return Ok(());
     }
+    restore_transfers(ksp, pc)?;
     petsc!(KSPSetUp(ksp))?;
     petsc!(PCMGGetLevels(pc, &mut levels))?;
     for level in 1..levels {
@@ -36,6 +38,35 @@ pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
         let Some(shell) = Shell::of(matrix, comm)? else { continue };
         petsc!(KSPSetOperators(smoother, shell.0, matrix))?;
         petsc!(PCMGSetResidual(pc, level, Some(sys::PCMGResidualDefault), shell.0))?;
+        let mut transfer = null_mut();
+        petsc!(PCMGGetInterpolation(pc, level, &mut transfer))?;
+        if !is_compressed(transfer)? {
+            continue;
+        }
+        if let Some(shell) = Shell::of(transfer, comm)? {
+            petsc!(PCMGSetInterpolation(pc, level, shell.0))?;
+            petsc!(PCMGSetRestriction(pc, level, shell.0))?;
+        }
+    }
+    Ok(())
+}
+
+/// Puts the exact transfer matrices back where another hierarchy is about to be made of them.
+fn restore_transfers(ksp: sys::KSP, pc: sys::PC) -> Result<()> {
+    let (mut reused, mut levels) = (sys::PETSC_FALSE, 0);
+    petsc!(KSPGetReusePreconditioner(ksp, &mut reused))?;
+    petsc!(PCMGGetLevels(pc, &mut levels))?;
+    if reused != sys::PETSC_FALSE {
+        return Ok(());
+    }
+    for level in 1..levels {
+        let mut transfer = null_mut();
+        petsc!(PCMGGetInterpolation(pc, level, &mut transfer))?;
+        if !transfer.is_null() && is_type(transfer.cast(), sys::MATSHELL)? {
+            let exact = with_product(transfer, |product| Ok(product.matrix.0))?;
+            petsc!(PCMGSetInterpolation(pc, level, exact))?;
+            petsc!(PCMGSetRestriction(pc, level, exact))?;
+        }
     }
     Ok(())
 }
@@ -58,10 +89,14 @@ pub(super) fn count(ksp: sys::KSP) -> Result<usize> {
 }
 
 fn wanted(ksp: sys::KSP) -> Result<bool> {
-    let name = c"-mg_levels_single".as_ptr();
-    let (mut prefix, mut value) = (null(), sys::PETSC_TRUE);
+    flag(ksp, c"-mg_levels_single", true)
+}
+
+/// An option under the solver's prefix.
+fn flag(ksp: sys::KSP, name: &CStr, default: bool) -> Result<bool> {
+    let (mut prefix, mut value) = (null(), bool_of(default));
     petsc!(KSPGetOptionsPrefix(ksp, &mut prefix))?;
-    petsc!(PetscOptionsGetBool(null_mut(), prefix, name, &mut value, null_mut()))?;
+    petsc!(PetscOptionsGetBool(null_mut(), prefix, name.as_ptr(), &mut value, null_mut()))?;
     Ok(value != sys::PETSC_FALSE)
 }
 
@@ -77,9 +112,11 @@ fn replaceable(smoother: sys::KSP) -> Result<Option<sys::Mat>> {
     petsc!(KSPChebyshevEstEigGetKSP(smoother, &mut estimator))?;
     petsc!(KSPGetOperators(smoother, &mut matrix, &mut other))?;
     let kept = estimator.is_null() && matrix == other;
-    let compressed =
-        is_type(matrix.cast(), sys::MATSEQAIJ)? || is_type(matrix.cast(), sys::MATMPIAIJ)?;
-    Ok((kept && compressed).then_some(matrix))
+    Ok((kept && is_compressed(matrix)?).then_some(matrix))
+}
+
+fn is_compressed(matrix: sys::Mat) -> Result<bool> {
+    Ok(is_type(matrix.cast(), sys::MATSEQAIJ)? || is_type(matrix.cast(), sys::MATMPIAIJ)?)
 }
 
 fn is_type(object: sys::PetscObject, kind: &[u8]) -> Result<bool> {
@@ -102,19 +139,23 @@ impl Shell {
         let all = sys::PETSC_DETERMINE;
         petsc!(MatCreateShell(comm.as_raw(), rows, columns, all, all, data, &mut shell.0))?;
         petsc!(MatShellSetContextDestroy(shell.0, Some(destroy)))?;
-        let multiply: unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode =
-            multiply;
-        // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls this one,
-        // by its place among the operations, as what it is.
-        let multiply = unsafe {
-            std::mem::transmute::<
-                unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode,
-                unsafe extern "C" fn(),
-            >(multiply)
-        };
-        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT, Some(multiply)))?;
+        let (once, twice) = (operation(multiply), operation(transposed));
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT, Some(once)))?;
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT_TRANSPOSE, Some(twice)))?;
+        // SAFETY: as in `operation`.
+        let sum = unsafe { std::mem::transmute::<Sum, unsafe extern "C" fn()>(multiply_add) };
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT_ADD, Some(sum)))?;
         Ok(Some(shell))
     }
+}
+
+type Apply = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
+type Sum = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
+
+fn operation(function: Apply) -> unsafe extern "C" fn() {
+    // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls this one, by
+    // its place among the operations, as what it is.
+    unsafe { std::mem::transmute::<Apply, unsafe extern "C" fn()>(function) }
 }
 
 impl Drop for Shell {
@@ -154,16 +195,17 @@ impl Product {
         if is_type(matrix.cast(), sys::MATMPIAIJ)? {
             petsc!(MatMPIAIJGetSeqAIJ(matrix, &mut own, &mut other, &mut map))?;
         }
-        let mut size = 0;
-        petsc!(MatGetBlockSize(matrix, &mut size))?;
-        let size = if size % 3 == 0 { 3 } else { size as usize };
+        let (mut tall, mut wide) = (0, 0);
+        petsc!(MatGetBlockSizes(matrix, &mut tall, &mut wide))?;
+        // Blocks of 6 are four of 3.
+        let size = [tall, wide].map(|size| if size % 3 == 0 { 3 } else { size.max(0) as usize });
         let own = Part::of(own, size)?;
         let halo = if other.is_null() { None } else { Some(ghost_blocks(other, map, size)?) };
         let mine = own.is_some() && !matches!(halo, Some(None));
         let mut everywhere = false;
         comm.all_reduce_into(&mine, &mut everywhere, SystemOperation::logical_and());
         let (true, Some(own)) = (everywhere, own) else { return Ok(None) };
-        let halo = halo.flatten().map(|(part, blocks)| Halo::of(matrix, part, size, &blocks));
+        let halo = halo.flatten().map(|(part, blocks)| Halo::of(matrix, part, size[1], &blocks));
         petsc!(PetscObjectReference(matrix.cast()))?;
         let matrix = Object(matrix);
         let mut product = Product { matrix, state: -1, own, halo: halo.transpose()? };
@@ -185,8 +227,8 @@ impl Product {
         Ok(())
     }
 
-    /// y = A x; the ghosts' values travel while the own part is multiplied.
-    fn multiply(&mut self, x: sys::Vec, y: sys::Vec) -> Result<()> {
+    /// y = A x, or y += A x; the ghosts' values travel while the own part is multiplied.
+    fn multiply(&mut self, x: sys::Vec, y: sys::Vec, add: bool) -> Result<()> {
         self.renew()?;
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
         if let Some(halo) = &self.halo {
@@ -195,7 +237,11 @@ impl Product {
         {
             // SAFETY: PETSc's vectors live through the call and are distinct, as `MatMult` asks.
             let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
-            self.own.blocks.multiply(&x, &mut y);
+            if add {
+                self.own.blocks.multiply_add(&x, &mut y);
+            } else {
+                self.own.blocks.multiply(&x, &mut y);
+            }
         }
         if let Some(halo) = &self.halo {
             petsc!(VecScatterEnd(halo.scatter.0, x, halo.ghosts.0, insert, forward))?;
@@ -207,8 +253,31 @@ impl Product {
     }
 }
 
+impl Product {
+    /// y = A^T x.
+    fn multiply_transposed(&mut self, x: sys::Vec, y: sys::Vec) -> Result<()> {
+        self.renew()?;
+        {
+            // SAFETY: as in `multiply`.
+            let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
+            self.own.blocks.multiply_transposed(&x, &mut y);
+        }
+        if let Some(halo) = &self.halo {
+            {
+                // SAFETY: as in `multiply`.
+                let (x, mut ghosts) = unsafe { (Values::of(x)?, ValuesMut::of(halo.ghosts.0)?) };
+                halo.part.blocks.multiply_transposed(&x, &mut ghosts);
+            }
+            let (add, back) = (sys::ADD_VALUES, sys::SCATTER_REVERSE);
+            petsc!(VecScatterBegin(halo.scatter.0, halo.ghosts.0, y, add, back))?;
+            petsc!(VecScatterEnd(halo.scatter.0, halo.ghosts.0, y, add, back))?;
+        }
+        Ok(())
+    }
+}
+
 impl Part {
-    fn of(source: sys::Mat, size: usize) -> Result<Option<Self>> {
+    fn of(source: sys::Mat, size: [usize; 2]) -> Result<Option<Self>> {
         let rows = Rows::of(source)?;
         let (offsets, columns) = rows.pattern();
         Ok(Blocks::of_pattern(size, offsets, columns).map(|blocks| Part { source, blocks }))
@@ -233,7 +302,7 @@ impl Part {
 fn ghost_blocks(
     other: sys::Mat,
     map: *const sys::PetscInt,
-    size: usize,
+    size: [usize; 2],
 ) -> Result<Option<(Part, Vec<sys::PetscInt>)>> {
     let (mut rows, mut count) = (0, 0);
     petsc!(MatGetLocalSize(other, &mut rows, &mut count))?;
@@ -243,15 +312,10 @@ fn ghost_blocks(
         // SAFETY: PETSc's list of the global column of each of the `count` columns.
         unsafe { std::slice::from_raw_parts(map, count as usize) }
     };
-    let whole = |run: &[sys::PetscInt]| {
-        run.len() == size
-            && (run[0] as usize).is_multiple_of(size)
-            && run.iter().zip(run[0]..).all(|(&column, expected)| column == expected)
-    };
-    if !map.chunks(size).all(whole) {
-        return Ok(None);
-    }
-    let blocks = map.chunks(size).map(|run| run[0] / size as sys::PetscInt).collect();
+    let wide = size[1].max(1);
+    let blocks: Option<Vec<_>> =
+        map.chunks(wide).map(|run| block_of(run, wide).map(|k| k as sys::PetscInt)).collect();
+    let Some(blocks) = blocks else { return Ok(None) };
     Ok(Part::of(other, size)?.map(|part| (part, blocks)))
 }
 
@@ -361,12 +425,38 @@ impl<T: Handle> Drop for Object<T> {
 // A panic cannot pass the C code below these functions: `extern "C"` turns it into an abort.
 
 unsafe extern "C" fn multiply(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
+    code(with_product(shell, |product| product.multiply(x, y, false)))
+}
+
+/// z = y + A x, where z may be y.
+unsafe extern "C" fn multiply_add(
+    shell: sys::Mat,
+    x: sys::Vec,
+    y: sys::Vec,
+    z: sys::Vec,
+) -> sys::PetscErrorCode {
+    code(with_product(shell, |product| {
+        if y != z {
+            petsc!(VecCopy(y, z))?;
+        }
+        product.multiply(x, z, true)
+    }))
+}
+
+unsafe extern "C" fn transposed(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
+    code(with_product(shell, |product| product.multiply_transposed(x, y)))
+}
+
+/// Acts on the context of a shell of ours.
+fn with_product<T>(shell: sys::Mat, act: impl FnOnce(&mut Product) -> Result<T>) -> Result<T> {
     let mut data: *mut c_void = null_mut();
-    let outcome = petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
-        // SAFETY: the context that `Shell::of` gave; PETSc multiplies by one matrix at a time.
-        let product = unsafe { &mut *data.cast::<Product>() };
-        product.multiply(x, y)
-    });
+    petsc!(MatShellGetContext(shell, (&raw mut data).cast()))?;
+    // SAFETY: the box that `Shell::of` gave up lives as long as the shell, and PETSc multiplies by
+    // one matrix at a time.
+    act(unsafe { &mut *data.cast::<Product>() })
+}
+
+fn code(outcome: Result<()>) -> sys::PetscErrorCode {
     outcome.map_or_else(|error| keep(&error), |()| 0)
 }
 
