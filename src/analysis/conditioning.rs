@@ -128,7 +128,7 @@ impl<const D: usize> System<D> {
     ) -> Result<Self> {
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let step = mesh.step_points(points, &model.materials);
-        let mass = mass::consistent(world, step, numbering, pattern)?;
+        let mass = mass::consistent(world, step, pattern)?;
         let mut mass_ghost = mass.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.mass)? {
             add(&mut mass_ghost.values, &share.values);

@@ -11,7 +11,7 @@ use crate::assembly::held::Held;
 use crate::assembly::in_place::{InPlace, Layout};
 use crate::assembly::internal::{self, Health, StepPoints};
 use crate::assembly::scatter::{self, BlockRows};
-use crate::assembly::{BlockMatrix, Numbering, Pattern};
+use crate::assembly::{BlockMatrix, Numbering, Pattern, mass};
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
 use crate::parallel::World;
@@ -433,11 +433,11 @@ pub fn ghost_matrix<const D: usize>(
         return Ok(None);
     }
     let mut matrix = BlockMatrix::zeros(&mesh.pattern);
-    for face in &mesh.faces {
-        let nodes: Vec<u32> = face.nodes.iter().map(|&node| mesh.numbering.index[node]).collect();
+    // Supports of the faces follow those of the groups.
+    for (support, face) in (mesh.groups.len()..).zip(&mesh.faces) {
         let factor = weight(face);
         let block: Vec<f64> = face.matrix.iter().map(|value| factor * value).collect();
-        matrix.add(&mesh.numbering, &mesh.pattern, &nodes, &block);
+        mass::add_support(&mut matrix, &mesh.pattern, support, &block);
     }
     matrix.reduce(world, &mesh.pattern)?;
     Ok(Some(matrix))

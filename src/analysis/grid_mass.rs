@@ -41,7 +41,7 @@ impl GridMass {
                 Ok(GridMass::Lumped(mass))
             }
             Mass::Consistent => {
-                let mut matrix = mass::consistent(world, step, numbering, &mesh.pattern)?;
+                let mut matrix = mass::consistent(world, step, &mesh.pattern)?;
                 let ghost = ghost_matrix(world, mesh, |face| face.mass)?;
                 if let Some(ghost) = &ghost {
                     for (value, share) in matrix.values.iter_mut().zip(&ghost.values) {

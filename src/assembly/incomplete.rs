@@ -66,47 +66,56 @@ impl Incomplete {
         pattern: &Pattern,
         diagonal: &[f64],
     ) -> Self {
-        let here = turn(world.rank());
-        let mut factor = Incomplete::plan(here, numbering, pattern);
+        let mut factor = Incomplete::plan(turn(world.rank()), numbering, pattern);
         let places = factor.places(numbering);
-        // The row being made, spread out over all columns.
         let mut spread = vec![0.0; numbering.len()];
-        let mut sorted = Vec::new();
-        for at in 0..factor.order.len() {
-            if at == factor.inner {
-                factor.hear(world, numbering);
-            }
-            let row = factor.order[at] as usize;
-            let begin = factor.columns.len();
-            if diagonal[row] > 0.0 {
-                let entries = pattern.offsets[row]..pattern.offsets[row + 1];
-                let earlier = entries.filter(|&entry| {
-                    let column = pattern.columns[entry] as usize;
-                    places[column] < places[row] && factor.inverse_diagonal[column] > 0.0
-                });
-                sorted.clear();
-                sorted.extend(earlier);
-                if at >= factor.inner {
-                    sorted.sort_unstable_by_key(|&entry| places[pattern.columns[entry] as usize]);
-                }
-                factor.columns.extend(sorted.iter().map(|&entry| pattern.columns[entry]));
-                factor.values.extend(sorted.iter().map(|&entry| matrix.values[entry]));
-            }
-            let pivot = diagonal[row] - factor.eliminate(begin, &mut spread);
-            let sound = pivot > LEAST_PIVOT * diagonal[row];
-            if !sound {
-                factor.columns.truncate(begin);
-                factor.values.truncate(begin);
-            }
-            let pivot = if sound { pivot } else { diagonal[row] };
-            factor.inverse_diagonal[row] = if pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
-            factor.rows[row] = [begin as u32, factor.columns.len() as u32];
-        }
-        if factor.inner == factor.order.len() {
-            factor.hear(world, numbering);
-        }
+        let (inner, all) = (factor.inner, factor.order.len());
+        factor.make(0..inner, matrix, pattern, diagonal, &places, &mut spread);
+        factor.hear(world, numbering);
+        factor.make(inner..all, matrix, pattern, diagonal, &places, &mut spread);
         factor.tell(world, numbering, &places);
         factor
+    }
+
+    /// The rows of `part` of the order. `spread`, a row spread out over all columns, is zero
+    /// before and after.
+    fn make(
+        &mut self,
+        part: Range<usize>,
+        matrix: &BlockMatrix<1>,
+        pattern: &Pattern,
+        diagonal: &[f64],
+        places: &[u32],
+        spread: &mut [f64],
+    ) {
+        let mut earlier = Vec::new();
+        for at in part {
+            let row = self.order[at] as usize;
+            let begin = self.columns.len();
+            if diagonal[row] > 0.0 {
+                let entries = pattern.offsets[row]..pattern.offsets[row + 1];
+                earlier.clear();
+                earlier.extend(entries.filter(|&entry| {
+                    let column = pattern.columns[entry] as usize;
+                    places[column] < places[row] && self.inverse_diagonal[column] > 0.0
+                }));
+                // Among inner nodes the columns ascend already.
+                if at >= self.inner {
+                    earlier.sort_unstable_by_key(|&entry| places[pattern.columns[entry] as usize]);
+                }
+                self.columns.extend(earlier.iter().map(|&entry| pattern.columns[entry]));
+                self.values.extend(earlier.iter().map(|&entry| matrix.values[entry]));
+            }
+            let pivot = diagonal[row] - self.eliminate(begin, spread);
+            let sound = pivot > LEAST_PIVOT * diagonal[row];
+            if !sound {
+                self.columns.truncate(begin);
+                self.values.truncate(begin);
+            }
+            let pivot = if sound { pivot } else { diagonal[row] };
+            self.inverse_diagonal[row] = if pivot > 0.0 { 1.0 / pivot.sqrt() } else { 0.0 };
+            self.rows[row] = [begin as u32, self.columns.len() as u32];
+        }
     }
 
     /// The order of elimination, without any entry.
@@ -134,14 +143,14 @@ impl Incomplete {
     /// Where each local node stands in the elimination; those of later ranks never come.
     fn places(&self, numbering: &Numbering) -> Vec<u32> {
         let mut places = vec![u32::MAX; numbering.len()];
-        let (inner, border) = self.order.split_at(self.inner);
         let mut earlier: Vec<(usize, Range<usize>)> =
             numbering.halo.ghosts().filter(|(rank, _)| turn(*rank) < self.here).collect();
         earlier.sort_unstable_by_key(|(rank, _)| turn(*rank));
-        let ghosts = earlier.into_iter().flat_map(|(_, ghosts)| ghosts);
-        let nodes = |part: &[u32]| part.to_vec().into_iter().map(|node| node as usize);
-        for (place, node) in nodes(inner).chain(ghosts).chain(nodes(border)).enumerate() {
-            places[node] = place as u32;
+        let ghosts = earlier.into_iter().flat_map(|(_, ghosts)| ghosts.map(|ghost| ghost as u32));
+        let (inner, border) = self.order.split_at(self.inner);
+        let sequence = inner.iter().copied().chain(ghosts).chain(border.iter().copied());
+        for (place, node) in sequence.enumerate() {
+            places[node as usize] = place as u32;
         }
         places
     }
@@ -294,7 +303,9 @@ impl Incomplete {
 #[cfg(test)]
 mod tests {
     use super::Incomplete;
-    use crate::assembly::{BlockMatrix, Pattern};
+    use crate::assembly::node_index::NodeIndex;
+    use crate::assembly::{BlockMatrix, Numbering, Pattern};
+    use crate::parallel::HaloPlan;
 
     /// A pattern of one rank with the given entries (row, column, value), each row ascending.
     fn system(rows: usize, entry: impl Fn(usize, usize) -> f64) -> (BlockMatrix<1>, Pattern) {
@@ -317,7 +328,21 @@ mod tests {
     fn solved(rows: usize, entry: impl Fn(usize, usize) -> f64) -> Vec<[f64; 2]> {
         let (matrix, pattern) = system(rows, &entry);
         let diagonal: Vec<f64> = (0..rows).map(|row| entry(row, row)).collect();
-        let factor = Incomplete::factor(&matrix, &pattern, &diagonal);
+        let numbering = Numbering {
+            owned: rows,
+            offset: 0,
+            total: rows,
+            nodes: (0..rows).collect(),
+            global: (0..rows as i32).collect(),
+            index: NodeIndex::new(0..rows),
+            halo: HaloPlan::default(),
+        };
+        let mut factor = Incomplete::plan(0, &numbering, &pattern);
+        assert_eq!((factor.inner, factor.order.len()), (rows, rows));
+        let places = factor.places(&numbering);
+        let mut spread = vec![0.0; rows];
+        factor.make(0..rows, &matrix, &pattern, &diagonal, &places, &mut spread);
+        assert_eq!(spread, vec![0.0; rows]);
         let x = field(rows);
         let b: Vec<[f64; 2]> = (0..rows)
             .map(|row| {
@@ -326,7 +351,9 @@ mod tests {
             })
             .collect();
         let mut z = vec![[0.0; 2]; rows];
-        let products = factor.apply(&b, &vec![[true; 2]; rows], &mut z);
+        let mut products = [0.0; 2];
+        factor.forward(&factor.order, &b, &mut z);
+        factor.backward(&factor.order, &b, &vec![[true; 2]; rows], &mut z, &mut products);
         for k in 0..2 {
             let dot: f64 = b.iter().zip(&z).map(|(b, z)| b[k] * z[k]).sum();
             assert!((dot - products[k]).abs() < 1e-12 * dot.abs());

@@ -197,7 +197,7 @@ fn tile<const ROWS: usize, const COLUMNS: usize, const FUSED: bool>(
 
 /// Adds `source`, runs of `LENGTH` values, at the columns (of `D` values) `positions`.
 #[inline(always)]
-fn add_runs<const D: usize, const LENGTH: usize>(
+pub(super) fn add_runs<const D: usize, const LENGTH: usize>(
     target: &mut [f64],
     source: &[f64],
     positions: &[u16],
