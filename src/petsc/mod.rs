@@ -10,7 +10,8 @@
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks in single precision |
-//! | `smoother.rs` | multigrid's smoothers on such matrices |
+//! | `product.rs` | such a matrix in the place of PETSc's own |
+//! | `smoother.rs` | multigrid's cycle on such matrices |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
 //! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
 //! | `forcing.rs` | [`Forcing`]: how well each linear solve of Newton's method is worth doing |
@@ -27,6 +28,7 @@ pub mod ksp;
 pub mod log;
 pub mod matrix;
 pub mod options;
+mod product;
 pub mod session;
 mod smoother;
 pub mod snes;

@@ -37,9 +37,46 @@ pub fn measured() -> Machine {
     Machine { triad, baseline, wide: of("avx2+fma").unwrap_or(baseline) }
 }
 
+/// Values of one array of the triad: none of the three stays in a cache.
+const LENGTH: usize = 12_000_000;
+
+/// Triad bandwidth of `cores` cores at once, GB/s together, counting three arrays once each: the
+/// best of several passes that all of them begin together, by wall time.
+pub fn triad_of(cores: usize) -> f64 {
+    use std::sync::Barrier;
+    use std::time::Instant;
+    const PASSES: usize = 12;
+    let start = Barrier::new(cores);
+    let passes: Vec<Vec<(Instant, Instant)>> = std::thread::scope(|scope| {
+        let stream = || {
+            let (b, c) = (vec![1.5f64; LENGTH], vec![0.25f64; LENGTH]);
+            let mut a = vec![0.0f64; LENGTH];
+            let pass = |pass: usize| {
+                let factor = black_box(3.0 + pass as f64);
+                start.wait();
+                let begin = Instant::now();
+                for ((a, b), c) in a.iter_mut().zip(&b).zip(&c) {
+                    *a = b + factor * c;
+                }
+                black_box(&mut a);
+                (begin, Instant::now())
+            };
+            (0..PASSES).map(pass).collect()
+        };
+        let threads: Vec<_> = (0..cores).map(|_| scope.spawn(stream)).collect();
+        threads.into_iter().map(|thread| thread.join().expect("a pass ends")).collect()
+    });
+    let seconds = (0..PASSES).map(|k| {
+        let begin = passes.iter().map(|pass| pass[k].0).min().expect("a core");
+        let end = passes.iter().map(|pass| pass[k].1).max().expect("a core");
+        (end - begin).as_secs_f64()
+    });
+    let best = seconds.fold(f64::INFINITY, f64::min);
+    (cores * 3 * LENGTH * size_of::<f64>()) as f64 / best * 1e-9
+}
+
 /// Triad bandwidth of one core, GB/s, counting three arrays once each (best of several passes).
 pub fn triad() -> f64 {
-    const LENGTH: usize = 12_000_000;
     let (b, c) = (vec![1.5f64; LENGTH], vec![0.25f64; LENGTH]);
     let mut a = vec![0.0f64; LENGTH];
     let mut best = f64::INFINITY;
