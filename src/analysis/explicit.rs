@@ -8,7 +8,7 @@ use crate::points::Points;
 
 use super::clock::Clock;
 use super::discretise::Model;
-use super::explicit_step::advance;
+use super::explicit_step::{Halt, advance};
 use super::ledger::{Entry, Ledger, StepSums};
 use super::recorder::{Ending, Recorder};
 use super::step_end::{self, End};
@@ -58,7 +58,12 @@ pub fn run<const D: usize>(
         before.record(points, model.deck.method.basis);
         let (mut solved, sums) = match advance(world, model, points, clock, span) {
             Ok(done) => done,
-            Err(Error::Run(why)) => {
+            Err(Halt::Failed(error)) if !matches!(error, Error::Run(_)) => return Err(error),
+            Err(halt) => {
+                let (why, inverted) = match halt {
+                    Halt::Refused(refusal) => (refusal.why, refusal.inverted),
+                    Halt::Failed(error) => (error.to_string(), false),
+                };
                 let culprit = world.first_message(update::not_finite(points));
                 let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
                 before.restore(points);
@@ -66,10 +71,9 @@ pub fn run<const D: usize>(
                     recorder.frame(world, number - 1, span.time_start, points)?;
                 }
                 recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
-                let hint = if why.contains("inside out") { unstabilised(model) } else { "" };
+                let hint = if inverted { unstabilised(model) } else { "" };
                 return Ok(Ending::failed(at(&format!("{why}{detail}{hint}"))));
             }
-            Err(other) => return Err(other),
         };
         let entry = Entry::unite(world, points, sums);
         let row = &mut solved.row;

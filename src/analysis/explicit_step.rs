@@ -6,12 +6,13 @@ use std::time::Instant;
 
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::internal::StepPoints;
-use crate::deck::model::{Mass, StressUpdate};
+use crate::deck::model::{Basis, Mass, StressUpdate};
 use crate::error::{Error, Result};
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::tensor::dense::identity;
 
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
@@ -21,7 +22,26 @@ use super::mapping;
 use super::reactions::reactions;
 use super::step_end::Solved;
 use super::transport::{self, Carrier};
-use super::update::{self, Increments, PointEnergies};
+use super::update::{self, Increments, PointEnergies, Refusal};
+
+/// Why a step has no end.
+pub(super) enum Halt {
+    /// Its increments cannot be applied.
+    Refused(Refusal),
+    Failed(Error),
+}
+
+impl From<Error> for Halt {
+    fn from(error: Error) -> Self {
+        Halt::Failed(error)
+    }
+}
+
+impl From<Refusal> for Halt {
+    fn from(refusal: Refusal) -> Self {
+        Halt::Refused(refusal)
+    }
+}
 
 /// One time step; the points end at their new state, not yet migrated. The row lacks the ledger's
 /// columns. Collective.
@@ -31,7 +51,7 @@ pub(super) fn advance<const D: usize>(
     points: &mut Points<D>,
     clock: &mut Clock,
     span: StepSpan,
-) -> Result<(Solved<D>, StepSums)> {
+) -> std::result::Result<(Solved<D>, StepSums), Halt> {
     let (deck, grid) = (&model.deck, &model.grid);
     let dt = span.time_end - span.time_start;
     let (mesh, conditions) = clock.time(Phase::Locate, || {
@@ -68,23 +88,24 @@ pub(super) fn advance<const D: usize>(
         force = Some(sum);
         Ok(momentum)
     })?;
-    // Nodal forces with the shares of all ranks; what is pushed must have mass.
-    let pushed_by = |force: &[[f64; D]]| -> Result<Vec<[f64; D]>> {
-        let mut pushed = force.to_vec();
-        numbering.halo.reverse_add(world, pushed.as_flattened_mut(), D)?;
+    let mut solving = 0.0;
+    let mut inverse = timed(&mut solving, || mass.inverse(world, grid, &mesh, &conditions.fixed))?;
+    // What is pushed must have mass.
+    let pushed_by = |inverse: &Inverse<'_, D>, force: Vec<[f64; D]>| -> Result<Vec<[f64; D]>> {
+        let pushed = inverse.summed(force)?;
         require_mass(world, grid, &mesh, &mass, &conditions.fixed, &pushed)?;
         Ok(pushed)
     };
-    let mut solving = 0.0;
-    let mut inverse = timed(&mut solving, || mass.inverse(world, grid, &mesh, &conditions.fixed))?;
     let mut pushed = None;
     let mut acceleration = None;
-    let mut velocity = match &force {
+    let mut velocity = match force {
         Some(force) => {
-            pushed = Some(pushed_by(force)?);
-            let both = [sums, force.clone()];
+            let force = pushed.insert(pushed_by(&inverse, force)?);
             let prescribed: [&[f64]; 2] = [&held_velocity, &at_rest];
-            let [velocity, solved] = timed(&mut solving, || inverse.solve_two(both, prescribed))?;
+            let [velocity, solved] = timed(&mut solving, || {
+                let sums = inverse.summed(sums)?;
+                inverse.solve_two([&sums, force], prescribed)
+            })?;
             acceleration = Some(solved);
             velocity
         }
@@ -120,23 +141,23 @@ pub(super) fn advance<const D: usize>(
         }
         deforming.iter_mut().for_each(|v| *v *= dt);
         deformation = mapping::deformation_increments(step, &deforming);
-        require_sound(world, points, &deformation)?;
+        if let Some(refusal) = update::deformation_to_refuse(world, points, &deformation) {
+            return Err(refusal.into());
+        }
         energies = update::deform(&model.materials, &deformation, points);
     }
 
     let step = mesh.step_points(points, &model.materials);
-    let force = match force {
-        Some(force) => force,
-        None => clock
-            .time(Phase::Assemble, || Ok(mapping::force(step, &external, &deformation, nodes)))?,
-    };
     let pushed = match pushed {
         Some(pushed) => pushed,
-        None => pushed_by(&force)?,
+        None => {
+            let sum = || Ok(mapping::force(step, &external, &deformation, nodes));
+            pushed_by(&inverse, clock.time(Phase::Assemble, sum)?)?
+        }
     };
     let acceleration = match acceleration {
         Some(acceleration) => acceleration,
-        None => timed(&mut solving, || inverse.solve(force, &at_rest))?,
+        None => timed(&mut solving, || inverse.solve_summed(&pushed, &at_rest, None))?,
     };
     for (v, a) in velocity.iter_mut().zip(&acceleration) {
         *v += dt * a;
@@ -183,11 +204,24 @@ pub(super) fn advance<const D: usize>(
             displacement: mapping::at_points(step, &moved),
         })
     })?;
-    let why =
-        clock.time(Phase::Update, || Ok(update::reason_to_refuse(world, grid, points, &made)))?;
-    if let Some(why) = why {
-        return Err(Error::Run(why));
-    }
+    let usf = deck.method.stress_update == StressUpdate::Usf;
+    clock.time(Phase::Update, || {
+        let refusal = update::reason_to_refuse(world, grid, points, &made);
+        Ok(refusal.map_or(Ok(()), Err))
+    })??;
+    clock.time(Phase::Update, || {
+        // With the stress updated first the points have the step's deformation already.
+        let basis = deck.method.basis;
+        let still = (usf && basis == Basis::Cpdi1).then(|| Increments {
+            deformation: vec![identity(); points.len()],
+            displacement: made.displacement.clone(),
+        });
+        let made = still.as_ref().unwrap_or(&made);
+        match update::unsound_domain(world, [grid; 2], basis, numbering, &moved, points, made) {
+            Some(why) => Err(Error::Run(why)),
+            None => Ok(()),
+        }
+    })?;
 
     let residual = residual(&mass, &mesh, &acceleration, &pushed);
     let work = point_work(&external, &made.displacement)
@@ -196,7 +230,6 @@ pub(super) fn advance<const D: usize>(
     let linear_iterations = inverse.iterations();
     clock.add(Phase::Solve, solving);
     clock.time(Phase::Update, || {
-        let usf = deck.method.stress_update == StressUpdate::Usf;
         if !usf {
             update::stretch(&made.deformation, points);
         }
@@ -282,29 +315,6 @@ fn sharpen<const D: usize>(
         }
     }
     Ok(sum)
-}
-
-/// Increments that can be applied at all. Collective.
-fn require_sound<const D: usize>(
-    world: &World,
-    points: &Points<D>,
-    deformation: &[[[f64; D]; D]],
-) -> Result<()> {
-    let bad = deformation.iter().enumerate().find_map(|(p, increment)| {
-        let determinant = crate::tensor::dense::determinant(increment);
-        let what = if !determinant.is_finite() {
-            "has a displacement that is not finite".to_string()
-        } else if determinant <= 0.0 {
-            format!("is turned inside out (det dF = {determinant:.3e})")
-        } else {
-            return None;
-        };
-        Some(format!("point {} at {:?} {what}", points.id[p], points.position[p]))
-    });
-    match world.first_message(bad) {
-        Some(message) => Err(Error::Run(message)),
-        None => Ok(()),
-    }
 }
 
 /// M a - f over the owned degrees of freedom: what boundaries supply where they hold.

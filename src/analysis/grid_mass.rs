@@ -136,7 +136,8 @@ impl<const D: usize> Inverse<'_, D> {
     /// M x = `sums`, where held x = `prescribed` (local). `sums` are nodal sums of this rank's
     /// points, sent to their owners here. Returns local values. Collective.
     pub fn solve(&mut self, sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
-        self.solve_from(sums, prescribed, None)
+        let sums = self.summed(sums)?;
+        self.solve_summed(&sums, prescribed, None)
     }
 
     /// [`Self::solve`] where x is near `guess` (local): iterations start there. Collective.
@@ -146,36 +147,39 @@ impl<const D: usize> Inverse<'_, D> {
         prescribed: &[f64],
         guess: &[f64],
     ) -> Result<Vec<f64>> {
-        self.solve_from(sums, prescribed, Some(guess))
+        let sums = self.summed(sums)?;
+        self.solve_summed(&sums, prescribed, Some(guess))
     }
 
-    /// [`Self::solve`] of two right-hand sides at once.
+    /// Nodal sums of this rank's points with those of the others, at the owned nodes. Collective.
+    pub fn summed(&self, mut sums: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
+        self.mesh.numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
+        Ok(sums)
+    }
+
+    /// [`Self::solve`] of two right-hand sides at once, both [`Self::summed`].
     pub fn solve_two(
         &mut self,
-        sums: [Vec<[f64; D]>; 2],
+        sums: [&[[f64; D]]; 2],
         prescribed: [&[f64]; 2],
     ) -> Result<[Vec<f64>; 2]> {
-        let [mut one, mut two] = sums;
         let How::Consistent(inverse) = &mut self.how else {
-            return Ok([self.solve(one, prescribed[0])?, self.solve(two, prescribed[1])?]);
+            let [one, two] = [0, 1].map(|k| self.solve_summed(sums[k], prescribed[k], None));
+            return Ok([one?, two?]);
         };
-        let numbering = &self.mesh.numbering;
-        for sums in [&mut one, &mut two] {
-            numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
-        }
-        let owned = numbering.owned * D;
-        inverse.solve_two([&one.as_flattened()[..owned], &two.as_flattened()[..owned]], prescribed)
+        let owned = self.mesh.numbering.owned;
+        inverse.solve_two(sums.map(|sums| sums[..owned].as_flattened()), prescribed)
     }
 
-    fn solve_from(
+    /// [`Self::solve`] of sums that are [`Self::summed`], from a `guess` if there is one.
+    pub fn solve_summed(
         &mut self,
-        mut sums: Vec<[f64; D]>,
+        sums: &[[f64; D]],
         prescribed: &[f64],
         guess: Option<&[f64]>,
     ) -> Result<Vec<f64>> {
         let numbering = &self.mesh.numbering;
-        numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
-        let rhs = &sums.as_flattened()[..numbering.owned * D];
+        let rhs = sums[..numbering.owned].as_flattened();
         match &mut self.how {
             How::Consistent(inverse) => inverse.solve_from(rhs, prescribed, guess),
             How::Lumped(mass) => {

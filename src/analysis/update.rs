@@ -60,32 +60,79 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
     made
 }
 
+/// Why a step cannot be applied, the same on every rank.
+#[derive(Debug)]
+pub struct Refusal {
+    pub why: String,
+    /// It turns a point inside out.
+    pub inverted: bool,
+}
+
 /// Says why the increments cannot be accepted, if so: a NaN, an inverted point, a point outside
-/// the grid (as it is after the step). The answer is the same on every rank. Collective.
+/// the grid (as it is after the step). Collective.
 pub fn reason_to_refuse<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     points: &Points<D>,
     increments: &Increments<D>,
-) -> Option<String> {
-    let mut reason = None;
-    for p in 0..points.len() {
+) -> Option<Refusal> {
+    refused(world, points, |p| {
         let x = points.position[p];
         let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
-        let determinant = tensor::dense::determinant(&increments.deformation[p]);
-        let what = if !determinant.is_finite() || moved.iter().any(|m| !m.is_finite()) {
-            "has a displacement that is not finite".to_string()
-        } else if determinant <= 0.0 {
-            format!("is turned inside out (det dF = {determinant:.3e})")
-        } else if grid.locate(&moved).is_none() {
-            format!("leaves the grid: it would move to {moved:?}")
-        } else {
-            continue;
-        };
-        reason = Some(format!("point {} at {x:?} {what}", points.id[p]));
-        break;
+        if moved.iter().any(|m| !m.is_finite()) {
+            return Some(Fault::NotFinite);
+        }
+        let fault = fault_of(&increments.deformation[p]);
+        fault.or_else(|| grid.locate(&moved).is_none().then(|| Fault::Leaves(format!("{moved:?}"))))
+    })
+}
+
+/// [`reason_to_refuse`] of dF alone. Collective.
+pub fn deformation_to_refuse<const D: usize>(
+    world: &World,
+    points: &Points<D>,
+    deformation: &[[[f64; D]; D]],
+) -> Option<Refusal> {
+    refused(world, points, |p| fault_of(&deformation[p]))
+}
+
+/// What is wrong with the increment of a point.
+enum Fault {
+    NotFinite,
+    /// det dF
+    Inverted(f64),
+    /// To where, m.
+    Leaves(String),
+}
+
+fn fault_of<const D: usize>(increment: &[[f64; D]; D]) -> Option<Fault> {
+    let determinant = tensor::dense::determinant(increment);
+    if !determinant.is_finite() {
+        return Some(Fault::NotFinite);
     }
-    world.first_message(reason)
+    (determinant <= 0.0).then_some(Fault::Inverted(determinant))
+}
+
+/// The first point of the lowest rank with a fault. Collective.
+fn refused<const D: usize>(
+    world: &World,
+    points: &Points<D>,
+    fault: impl Fn(usize) -> Option<Fault>,
+) -> Option<Refusal> {
+    let found = (0..points.len()).find_map(|p| fault(p).map(|fault| (p, fault)));
+    let inverted = matches!(found, Some((_, Fault::Inverted(_))));
+    let message = found.map(|(p, fault)| {
+        let what = match fault {
+            Fault::NotFinite => "has a displacement that is not finite".to_string(),
+            Fault::Inverted(determinant) => {
+                format!("is turned inside out (det dF = {determinant:.3e})")
+            }
+            Fault::Leaves(place) => format!("leaves the grid: it would move to {place}"),
+        };
+        format!("point {} at {:?} {what}", points.id[p], points.position[p])
+    });
+    let why = world.first_message(message)?;
+    Some(Refusal { why, inverted: world.any(inverted) })
 }
 
 /// The first point of this rank whose state is not a number, if any.

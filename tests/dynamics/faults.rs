@@ -125,6 +125,34 @@ fn a_domain_that_leaves_the_grid_refuses_the_implicit_step() {
     }
 }
 
+/// The explicit step that takes a domain out of the grid is the one that fails, not the next.
+#[test]
+fn a_domain_that_leaves_the_grid_ends_the_explicit_step() {
+    const SPEED: f64 = 1.02;
+    let block = format!(
+        "shape = {{ box = {{ min = [2, 2], max = [4, 4] }} }}\npoints_per_cell = 1\n\
+         velocity = [\"-{SPEED:?}\", \"0\"]"
+    );
+    let leaving = blocks(&[&block])
+        .set("analysis={ type = \"explicit\", steps = 100, duration = 3 }")
+        .set("ghost.mass_factor=0.25");
+    for (basis, update, ranks) in [("cpdi1", "usl", 1), ("cpdi1", "usf", 2), ("cpdi2", "usl", 1)] {
+        let run = leaving
+            .clone()
+            .set(format!("method.basis=\"{basis}\""))
+            .set(format!("method.stress_update=\"{update}\""))
+            .ranks(ranks);
+        let outcome = run.attempt();
+        // Corners may be a quarter of a cell outside, until 2.206 s.
+        assert_says(&outcome, 1, &["step 74 ", "corner ", "is outside the grid at"]);
+        let results = outcome.results();
+        assert_eq!(results.count("steps_completed"), 73, "{basis}, {update}");
+        for ux in results.points(73).component("displacement", 0) {
+            assert!((ux + SPEED * 2.19).abs() < 1e-9, "{basis}, {update}: {ux}");
+        }
+    }
+}
+
 #[test]
 fn an_unstabilised_consistent_mass_is_named() {
     let outcome = collision().set("ghost.mass_factor=0").attempt();
