@@ -98,6 +98,9 @@ impl Batch {
         rows: &[(usize, usize)],
         values: &mut R,
     ) {
+        if self.points == 1 {
+            return self.flush_one::<D, FUSED, R>(place, rows, values);
+        }
         let depth = self.points * D;
         self.points = 0;
         let plane = self.capacity * D * self.stride;
@@ -130,6 +133,66 @@ impl Batch {
                     }
                 }
                 a += tall;
+            }
+        }
+    }
+}
+
+impl Batch {
+    /// The same for a single point: so few products are not worth a strip.
+    #[inline(always)]
+    fn flush_one<const D: usize, const FUSED: bool, R: BlockRows<D>>(
+        &mut self,
+        place: Place<'_>,
+        rows: &[(usize, usize)],
+        values: &mut R,
+    ) {
+        self.points = 0;
+        match (D, place.run) {
+            (2, 3) => self.products::<D, 6, FUSED, R>(place, rows, values),
+            (3, 3) => self.products::<D, 9, FUSED, R>(place, rows, values),
+            (2, 2) => self.products::<D, 4, FUSED, R>(place, rows, values),
+            (3, 2) => self.products::<D, 6, FUSED, R>(place, rows, values),
+            _ => self.products::<D, D, FUSED, R>(place, rows, values),
+        }
+    }
+
+    #[inline(always)]
+    fn products<const D: usize, const LENGTH: usize, const FUSED: bool, R: BlockRows<D>>(
+        &self,
+        place: Place<'_>,
+        rows: &[(usize, usize)],
+        values: &mut R,
+    ) {
+        let (n, stride) = (self.nodes, self.stride);
+        let runs = n / place.run;
+        let plane = self.capacity * D * stride;
+        for (node, &(start, width)) in rows.iter().enumerate() {
+            let positions = &place.positions[node * runs..(node + 1) * runs];
+            let factors: [f64; D] = std::array::from_fn(|j| self.gradients[j * n + node]);
+            for i in 0..D {
+                let target = values.values(start + i * width, width);
+                let flux: [&[f64]; D] = std::array::from_fn(|j| {
+                    &self.flux[i * plane + j * stride..i * plane + j * stride + n * D]
+                });
+                for (run, &position) in positions.iter().enumerate() {
+                    let mut sums = [0.0; LENGTH];
+                    for j in 0..D {
+                        let source: &[f64; LENGTH] = first(&flux[j][run * LENGTH..]);
+                        for (sum, value) in sums.iter_mut().zip(source) {
+                            *sum = multiply_add::<FUSED>(factors[j], *value, *sum);
+                        }
+                    }
+                    let target: &mut [f64; LENGTH] = target[usize::from(position) * D..]
+                        .first_chunk_mut()
+                        .expect("a run lies within its row");
+                    // Loaded as a whole: entry by entry the compiler must fear an overlap.
+                    let mut total = *target;
+                    for (total, sum) in total.iter_mut().zip(sums) {
+                        *total += sum;
+                    }
+                    *target = total;
+                }
             }
         }
     }
