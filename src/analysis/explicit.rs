@@ -8,7 +8,8 @@ use crate::points::Points;
 
 use super::clock::Clock;
 use super::discretise::Model;
-use super::explicit_step::{Halt, advance};
+use super::explicit_nodes::Halt;
+use super::explicit_step::advance;
 use super::ledger::{Entry, Ledger, StepSums};
 use super::recorder::{Ending, Recorder};
 use super::step_end::{self, End};

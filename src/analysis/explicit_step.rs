@@ -2,46 +2,27 @@
 //! v' = v + dt a (Ghost §2.3, eq. 4-11; w: [`super::transport`]): one explicit step, stress updated
 //! first, last, or last with the velocity mapped once more.
 
-use std::time::Instant;
-
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::internal::StepPoints;
 use crate::deck::model::{Basis, Mass, StressUpdate};
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::tensor::Square;
 use crate::tensor::dense::identity;
 
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
-use super::grid_mass::{GridMass, Inverse, require_mass};
+use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
+use super::grid_mass::GridMass;
 use super::ledger::StepSums;
 use super::mapping;
 use super::reactions::reactions;
 use super::step_end::Solved;
 use super::transport::{self, Carrier};
-use super::update::{self, Increments, PointEnergies, Refusal};
-
-/// Why a step has no end.
-pub(super) enum Halt {
-    /// Its increments cannot be applied.
-    Refused(Refusal),
-    Failed(Error),
-}
-
-impl From<Error> for Halt {
-    fn from(error: Error) -> Self {
-        Halt::Failed(error)
-    }
-}
-
-impl From<Refusal> for Halt {
-    fn from(refusal: Refusal) -> Self {
-        Halt::Refused(refusal)
-    }
-}
+use super::update::{self, Increments};
 
 /// One time step; the points end at their new state, not yet migrated. The row lacks the ledger's
 /// columns. Collective.
@@ -53,204 +34,82 @@ pub(super) fn advance<const D: usize>(
     span: StepSpan,
 ) -> std::result::Result<(Solved<D>, StepSums), Halt> {
     let (deck, grid) = (&model.deck, &model.grid);
-    let dt = span.time_end - span.time_start;
+    let (method, dt) = (&deck.method, span.time_end - span.time_start);
+    let usf = method.stress_update == StressUpdate::Usf;
     let (mesh, conditions) = clock.time(Phase::Locate, || {
-        let coupling = match deck.method.mass {
+        let coupling = match method.mass {
             Mass::Consistent => Coupling::Mass,
             Mass::Lumped => Coupling::Diagonal,
         };
         Discretisation::with_conditions(world, model, points, coupling, span)
     })?;
-    let numbering = &mesh.numbering;
-    let nodes = numbering.len();
-    // Held components move with their boundary's mean velocity over the step.
-    let held_velocity: Vec<f64> = conditions.increment.iter().map(|u| u / dt).collect();
-    let at_rest = vec![0.0; nodes * D];
     // Empty without loads.
     let external = if deck.loads.is_empty() {
         Vec::new()
     } else {
         model.point_forces(world, points, span.factor_start, span.time_start)?
     };
-
     let mass = clock.time(Phase::Assemble, || {
         let step = mesh.step_points(points, &model.materials);
-        GridMass::assemble(world, &mesh, step, deck.method.mass)
+        GridMass::assemble(world, &mesh, step, method.mass)
     })?;
-    // Before the stress is updated last, one pass over the points gives both sums.
-    let mut force = None;
-    let sums = clock.time(Phase::Assemble, || {
-        let step = mesh.step_points(points, &model.materials);
-        if deck.method.stress_update == StressUpdate::Usf {
-            return Ok(mapping::momentum(step, &points.velocity, nodes));
-        }
-        let (momentum, sum) = mapping::momentum_and_force(step, &external, nodes);
-        force = Some(sum);
-        Ok(momentum)
-    })?;
-    let mut solving = 0.0;
-    let mut inverse = timed(&mut solving, || mass.inverse(world, grid, &mesh, &conditions.fixed))?;
-    // What is pushed must have mass.
-    let pushed_by = |inverse: &Inverse<'_, D>, force: Vec<[f64; D]>| -> Result<Vec<[f64; D]>> {
-        let pushed = inverse.summed(force)?;
-        require_mass(world, grid, &mesh, &mass, &conditions.fixed, &pushed)?;
-        Ok(pushed)
-    };
-    let mut pushed = None;
-    let mut acceleration = None;
-    let mut velocity = match force {
-        Some(force) => {
-            let force = pushed.insert(pushed_by(&inverse, force)?);
-            let prescribed: [&[f64]; 2] = [&held_velocity, &at_rest];
-            let [velocity, solved] = timed(&mut solving, || {
-                let sums = inverse.summed(sums)?;
-                inverse.solve_two([&sums, force], prescribed)
-            })?;
-            acceleration = Some(solved);
-            velocity
-        }
-        None => timed(&mut solving, || inverse.solve(sums, &held_velocity))?,
-    };
-    if let Some(order) = deck.method.xpic {
-        let step = mesh.step_points(points, &model.materials);
-        velocity =
-            timed(&mut solving, || sharpen(&mut inverse, step, velocity, order, &at_rest, nodes))?;
-    }
+    let mut nodes = Nodes::new(world, model, &mesh, &conditions, &mass, &external, dt)?;
 
-    let flip = deck.method.flip;
-    let carrier = transport::carrier(
-        deck.method.position_update,
-        deck.method.stress_update,
-        deck.method.mass == Mass::Consistent,
-        model.penalties.iter().any(|penalty| penalty.mass > 0.0),
-        flip,
-    );
-
-    // Update stress first: with the velocity at the step's start.
-    let mut energies = PointEnergies::default();
-    let mut deformation = Vec::new();
-    let mut deforming = Vec::new();
-    if deck.method.stress_update == StressUpdate::Usf {
-        let step = mesh.step_points(points, &model.materials);
-        if carrier == Carrier::RemappedBack && flip < 1.0 {
-            let shared = blend(flip, &points.velocity, &mapping::at_points(step, &velocity));
-            let sums = mapping::momentum(step, &shared, nodes);
-            deforming = timed(&mut solving, || inverse.solve(sums, &held_velocity))?;
-        } else {
-            deforming.clone_from(&velocity);
-        }
-        deforming.iter_mut().for_each(|v| *v *= dt);
-        deformation = mapping::deformation_increments(step, &deforming);
-        if let Some(refusal) = update::deformation_to_refuse(world, points, &deformation) {
-            return Err(refusal.into());
-        }
-        energies = update::deform(&model.materials, &deformation, points);
-    }
-
-    let step = mesh.step_points(points, &model.materials);
-    let pushed = match pushed {
-        Some(pushed) => pushed,
-        None => {
-            let sum = || Ok(mapping::force(step, &external, &deformation, nodes));
-            pushed_by(&inverse, clock.time(Phase::Assemble, sum)?)?
-        }
+    let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;
+    let carrier = carrier(model);
+    let first = match method.stress_update {
+        StressUpdate::Usf => Some(nodes.deform_first(carrier, &velocity, points)?),
+        StressUpdate::Usl | StressUpdate::Musl => None,
     };
-    let acceleration = match acceleration {
-        Some(acceleration) => acceleration,
-        None => timed(&mut solving, || inverse.solve_summed(&pushed, &at_rest, None))?,
+    let Forces { pushed, acceleration } = match (forces, &first) {
+        (Some(forces), _) => forces,
+        (None, first) => {
+            let deformation = first.as_ref().map_or(&[][..], |(deformation, _)| deformation);
+            nodes.forces(points, deformation, clock)?
+        }
     };
     for (v, a) in velocity.iter_mut().zip(&acceleration) {
         *v += dt * a;
     }
+    let step = mesh.step_points(points, &model.materials);
+    let (rate, new_velocity) = clock.time(Phase::Update, || {
+        Ok(mapping::push(step, &acceleration, &velocity, method.flip, dt))
+    })?;
+    let Motion { moved, deforming } =
+        nodes.motion(carrier, step, &new_velocity, &velocity, &acceleration)?;
+    let (deformation, energies) = first.unzip();
+    let made =
+        clock.time(Phase::Update, || Ok(increments(step, &moved, &deforming, deformation)))?;
+    clock.time(Phase::Update, || Ok(refuse(world, model, &mesh, points, &made, &moved)))??;
 
-    let (rate, new_velocity) = clock
-        .time(Phase::Update, || Ok(mapping::push(step, &acceleration, &velocity, flip, dt)))?;
-
-    let musl = deck.method.stress_update == StressUpdate::Musl;
-    let mut moving = velocity.clone();
-    let mut again = None;
-    if carrier.needs_solve() || musl {
-        let sums = mapping::momentum(step, &new_velocity, nodes);
-        let solved = timed(&mut solving, || inverse.solve_near(sums, &held_velocity, &velocity))?;
-        if carrier.needs_solve() {
-            moving.clone_from(&solved);
-        }
-        again = Some(solved);
-    }
-    if matches!(carrier, Carrier::Start | Carrier::RemappedBack) {
-        for (w, a) in moving.iter_mut().zip(&acceleration) {
-            *w -= dt * a;
-        }
-    }
-    let moved: Vec<f64> = moving.iter().map(|w| w * dt).collect();
     let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();
-    let made = clock.time(Phase::Update, || {
-        let deforming = match (deck.method.stress_update, &again) {
-            (StressUpdate::Usf, _) => {
-                let mut displacement = mapping::at_points(step, &moved);
-                return Ok(Increments {
-                    deformation: std::mem::take(&mut deformation),
-                    displacement: std::mem::take(&mut displacement),
-                });
-            }
-            (StressUpdate::Musl, Some(again)) => again.iter().map(|v| v * dt).collect(),
-            _ => displacement.clone(),
-        };
-        if deforming == moved {
-            return Ok(update::increments(step, &moved));
-        }
-        Ok(Increments {
-            deformation: mapping::deformation_increments(step, &deforming),
-            displacement: mapping::at_points(step, &moved),
-        })
-    })?;
-    let usf = deck.method.stress_update == StressUpdate::Usf;
-    clock.time(Phase::Update, || {
-        let refusal = update::reason_to_refuse(world, grid, points, &made);
-        Ok(refusal.map_or(Ok(()), Err))
-    })??;
-    clock.time(Phase::Update, || {
-        // With the stress updated first the points have the step's deformation already.
-        let basis = deck.method.basis;
-        let still = (usf && basis == Basis::Cpdi1).then(|| Increments {
-            deformation: vec![identity(); points.len()],
-            displacement: made.displacement.clone(),
-        });
-        let made = still.as_ref().unwrap_or(&made);
-        match update::unsound_domain(world, [grid; 2], basis, numbering, &moved, points, made) {
-            Some(why) => Err(Error::Run(why)),
-            None => Ok(()),
-        }
-    })?;
-
     let residual = residual(&mass, &mesh, &acceleration, &pushed);
     let work = point_work(&external, &made.displacement)
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);
-    let linear_iterations = inverse.iterations();
-    clock.add(Phase::Solve, solving);
-    clock.time(Phase::Update, || {
+    let linear_iterations = nodes.inverse.iterations();
+    clock.add(Phase::Solve, nodes.seconds);
+    let energies = clock.time(Phase::Update, || {
         if !usf {
             update::stretch(&made.deformation, points);
         }
-        let method = &deck.method;
         let followed = update::follow(
             grid,
             method.basis,
             method.domain_update,
-            numbering,
+            &mesh.numbering,
             &moved,
             &made.deformation,
             points,
         );
         world.fail_together(followed)?;
-        if !usf {
-            energies = update::respond(&model.materials, &made.deformation, points);
-        }
+        let respond =
+            |points: &mut Points<D>| update::respond(&model.materials, &made.deformation, points);
+        let energies = energies.unwrap_or_else(|| respond(points));
         update::move_points(&made.displacement, points);
         points.velocity = new_velocity;
         points.acceleration = rate;
-        Ok(())
+        Ok(energies)
     })?;
 
     let reaction: Vec<f64> = residual
@@ -266,7 +125,7 @@ pub(super) fn advance<const D: usize>(
         reactions: reactions(
             world,
             grid,
-            numbering,
+            &mesh.numbering,
             &deck.boundaries,
             &conditions,
             &residual,
@@ -278,43 +137,62 @@ pub(super) fn advance<const D: usize>(
     Ok((Solved { row, mesh, displacement, reaction, moved_grid: None }, sums))
 }
 
-/// Does `work` and adds its wall seconds to `seconds`.
-fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
-    let begin = Instant::now();
-    let outcome = work();
-    *seconds += begin.elapsed().as_secs_f64();
-    outcome
+/// What carries the points of this deck.
+fn carrier<const D: usize>(model: &Model<D>) -> Carrier {
+    let method = &model.deck.method;
+    transport::carrier(
+        method.position_update,
+        method.stress_update,
+        method.mass == Mass::Consistent,
+        model.penalties.iter().any(|penalty| penalty.mass > 0.0),
+        method.flip,
+    )
 }
 
-/// share a + (1 - share) b at each point.
-fn blend<const D: usize>(share: f64, a: &[[f64; D]], b: &[[f64; D]]) -> Vec<[f64; D]> {
-    a.iter()
-        .zip(b)
-        .map(|(a, b)| std::array::from_fn(|i| share * a[i] + (1.0 - share) * b[i]))
-        .collect()
-}
-
-/// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the
-/// consistent mass, with S+ v_p = M^-1 Σ m S^T v_p by the lumped mass.
-fn sharpen<const D: usize>(
-    inverse: &mut Inverse<'_, D>,
+/// What the points gain by the nodal increments; `deformation`: what they have taken already.
+fn increments<const D: usize>(
     step: StepPoints<'_, D>,
-    velocity: Vec<f64>,
-    order: usize,
-    at_rest: &[f64],
-    nodes: usize,
-) -> Result<Vec<f64>> {
-    let mut sum = velocity.clone();
-    let mut term = velocity;
-    for _ in 1..order {
-        let back = mapping::at_points(step, &term);
-        let mapped = inverse.solve(mapping::momentum(step, &back, nodes), at_rest)?;
-        for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
-            *t -= m;
-            *s += *t;
+    moved: &[f64],
+    deforming: &[f64],
+    deformation: Option<Vec<Square<D>>>,
+) -> Increments<D> {
+    match deformation {
+        Some(deformation) => {
+            Increments { deformation, displacement: mapping::at_points(step, moved) }
         }
+        None if deforming == moved => update::increments(step, moved),
+        None => Increments {
+            deformation: mapping::deformation_increments(step, deforming),
+            displacement: mapping::at_points(step, moved),
+        },
     }
-    Ok(sum)
+}
+
+/// Refuses increments that cannot be applied. Collective.
+fn refuse<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    made: &Increments<D>,
+    moved: &[f64],
+) -> std::result::Result<(), Halt> {
+    let (grid, method) = (&model.grid, &model.deck.method);
+    if let Some(refusal) = update::reason_to_refuse(world, grid, points, made) {
+        return Err(refusal.into());
+    }
+    // With the stress updated first the points have the step's deformation already.
+    let usf = method.stress_update == StressUpdate::Usf;
+    let still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
+        deformation: vec![identity(); points.len()],
+        displacement: made.displacement.clone(),
+    });
+    let made = still.as_ref().unwrap_or(made);
+    let numbering = &mesh.numbering;
+    match update::unsound_domain(world, [grid; 2], method.basis, numbering, moved, points, made) {
+        Some(why) => Err(Error::Run(why).into()),
+        None => Ok(()),
+    }
 }
 
 /// M a - f over the owned degrees of freedom: what boundaries supply where they hold.

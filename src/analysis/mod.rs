@@ -3,7 +3,7 @@
 //! | deck value or step | file | source |
 //! |---|---|---|
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
-//! | `explicit` | `explicit.rs`, `explicit_step.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
+//! | `explicit` | `explicit.rs`, `explicit_step.rs`, `explicit_nodes.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
 //! | what carries the points | `transport.rs` | Ghost eq. 9 |
 //! | `implicit-dynamic` | `implicit_dynamic.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
@@ -35,6 +35,7 @@ pub mod discretise;
 pub mod driver;
 pub mod equilibrium;
 pub mod explicit;
+mod explicit_nodes;
 mod explicit_step;
 pub mod extremes;
 pub mod grid_mass;

@@ -1,0 +1,263 @@
+//! v = M~^-1 Σ m S^T v_p and a = M~^-1 (f_ext - f_int) at the nodes of an explicit step (Ghost §2.3,
+//! eq. 6 and 10), and the nodal increments that move and deform the points.
+
+use std::time::Instant;
+
+use crate::assembly::conditions::Conditions;
+use crate::assembly::internal::StepPoints;
+use crate::deck::model::StressUpdate;
+use crate::error::{Error, Result};
+use crate::parallel::World;
+use crate::petsc::log::Phase;
+use crate::points::Points;
+use crate::tensor::Square;
+
+use super::clock::Clock;
+use super::discretise::{Discretisation, Model};
+use super::grid_mass::{GridMass, Inverse, require_mass};
+use super::mapping;
+use super::transport::Carrier;
+use super::update::{self, PointEnergies, Refusal};
+
+/// Why a step has no end.
+pub(super) enum Halt {
+    /// Its increments cannot be applied.
+    Refused(Refusal),
+    Failed(Error),
+}
+
+impl From<Error> for Halt {
+    fn from(error: Error) -> Self {
+        Halt::Failed(error)
+    }
+}
+
+impl From<Refusal> for Halt {
+    fn from(refusal: Refusal) -> Self {
+        Halt::Refused(refusal)
+    }
+}
+
+/// A step's equations at the nodes.
+pub(super) struct Nodes<'a, const D: usize> {
+    world: &'a World,
+    model: &'a Model<D>,
+    mesh: &'a Discretisation<D>,
+    conditions: &'a Conditions,
+    mass: &'a GridMass,
+    pub inverse: Inverse<'a, D>,
+    /// Of the points, N; empty without loads.
+    external: &'a [[f64; D]],
+    dt: f64,
+    /// Held components move with their boundary's mean velocity over the step.
+    held_velocity: Vec<f64>,
+    at_rest: Vec<f64>,
+    /// Wall seconds of the solves so far.
+    pub seconds: f64,
+}
+
+/// Nodal force with the shares of all ranks, N, and acceleration, m/s2.
+pub(super) struct Forces<const D: usize> {
+    pub pushed: Vec<[f64; D]>,
+    pub acceleration: Vec<f64>,
+}
+
+/// Nodal increments, m: those that move the points and those that deform them.
+pub(super) struct Motion {
+    pub moved: Vec<f64>,
+    pub deforming: Vec<f64>,
+}
+
+impl<'a, const D: usize> Nodes<'a, D> {
+    /// Collective.
+    pub fn new(
+        world: &'a World,
+        model: &'a Model<D>,
+        mesh: &'a Discretisation<D>,
+        conditions: &'a Conditions,
+        mass: &'a GridMass,
+        external: &'a [[f64; D]],
+        dt: f64,
+    ) -> Result<Self> {
+        let mut seconds = 0.0;
+        let inverse =
+            timed(&mut seconds, || mass.inverse(world, &model.grid, mesh, &conditions.fixed))?;
+        let held_velocity = conditions.increment.iter().map(|u| u / dt).collect();
+        let at_rest = vec![0.0; mesh.numbering.len() * D];
+        Ok(Nodes {
+            world,
+            model,
+            mesh,
+            conditions,
+            mass,
+            inverse,
+            external,
+            dt,
+            held_velocity,
+            at_rest,
+            seconds,
+        })
+    }
+
+    /// v of Ghost eq. 10, sharpened if the deck says so, and the forces where the stress is
+    /// updated last: one pass over the points and one iteration then give both. Collective.
+    pub fn velocity_and_forces(
+        &mut self,
+        points: &Points<D>,
+        clock: &mut Clock,
+    ) -> Result<(Vec<f64>, Option<Forces<D>>)> {
+        let step = self.mesh.step_points(points, &self.model.materials);
+        let (count, method) = (self.mesh.numbering.len(), &self.model.deck.method);
+        let (mut velocity, forces) = if method.stress_update == StressUpdate::Usf {
+            let momentum = || Ok(mapping::momentum(step, &points.velocity, count));
+            let momentum = clock.time(Phase::Assemble, momentum)?;
+            let velocity = self.solve(momentum)?;
+            (velocity, None)
+        } else {
+            let (momentum, force) = clock.time(Phase::Assemble, || {
+                Ok(mapping::momentum_and_force(step, self.external, count))
+            })?;
+            let pushed = self.summed_and_carried(force)?;
+            let prescribed: [&[f64]; 2] = [&self.held_velocity, &self.at_rest];
+            let [velocity, acceleration] = timed(&mut self.seconds, || {
+                let momentum = self.inverse.summed(momentum)?;
+                self.inverse.solve_two([&momentum, &pushed], prescribed)
+            })?;
+            (velocity, Some(Forces { pushed, acceleration }))
+        };
+        if let Some(order) = method.xpic {
+            velocity = timed(&mut self.seconds, || {
+                sharpen(&mut self.inverse, step, velocity, order, &self.at_rest, count)
+            })?;
+        }
+        Ok((velocity, forces))
+    }
+
+    /// The forces after the points have taken the step's `deformation`. Collective.
+    pub fn forces(
+        &mut self,
+        points: &Points<D>,
+        deformation: &[Square<D>],
+        clock: &mut Clock,
+    ) -> Result<Forces<D>> {
+        let step = self.mesh.step_points(points, &self.model.materials);
+        let count = self.mesh.numbering.len();
+        let sum = || Ok(mapping::force(step, self.external, deformation, count));
+        let pushed = self.summed_and_carried(clock.time(Phase::Assemble, sum)?)?;
+        let acceleration =
+            timed(&mut self.seconds, || self.inverse.solve_summed(&pushed, &self.at_rest, None))?;
+        Ok(Forces { pushed, acceleration })
+    }
+
+    /// Updates the stress first, with the nodal `velocity` at the step's start: dF of the points,
+    /// and what they hold and lose then. Collective.
+    #[allow(clippy::type_complexity)]
+    pub fn deform_first(
+        &mut self,
+        carrier: Carrier,
+        velocity: &[f64],
+        points: &mut Points<D>,
+    ) -> std::result::Result<(Vec<Square<D>>, PointEnergies), Halt> {
+        let step = self.mesh.step_points(points, &self.model.materials);
+        let flip = self.model.deck.method.flip;
+        let mut deforming = if carrier == Carrier::RemappedBack && flip < 1.0 {
+            let shared = blend(flip, &points.velocity, &mapping::at_points(step, velocity));
+            self.solve(mapping::momentum(step, &shared, self.mesh.numbering.len()))?
+        } else {
+            velocity.to_vec()
+        };
+        deforming.iter_mut().for_each(|v| *v *= self.dt);
+        let deformation = mapping::deformation_increments(step, &deforming);
+        if let Some(refusal) = update::deformation_to_refuse(self.world, points, &deformation) {
+            return Err(refusal.into());
+        }
+        let energies = update::deform(&self.model.materials, &deformation, points);
+        Ok((deformation, energies))
+    }
+
+    /// dt w with w of [`super::transport`], and dt times the velocity that deforms: v', or with
+    /// musl that of the updated points. Collective.
+    pub fn motion(
+        &mut self,
+        carrier: Carrier,
+        step: StepPoints<'_, D>,
+        new_velocity: &[[f64; D]],
+        velocity: &[f64],
+        acceleration: &[f64],
+    ) -> Result<Motion> {
+        let dt = self.dt;
+        let musl = self.model.deck.method.stress_update == StressUpdate::Musl;
+        let mut moving = velocity.to_vec();
+        let mut deforming = None;
+        if carrier.needs_solve() || musl {
+            let sums = mapping::momentum(step, new_velocity, self.mesh.numbering.len());
+            let again = timed(&mut self.seconds, || {
+                self.inverse.solve_near(sums, &self.held_velocity, velocity)
+            })?;
+            if carrier.needs_solve() {
+                moving.clone_from(&again);
+            }
+            deforming = musl.then_some(again);
+        }
+        if matches!(carrier, Carrier::Start | Carrier::RemappedBack) {
+            for (w, a) in moving.iter_mut().zip(acceleration) {
+                *w -= dt * a;
+            }
+        }
+        let over_step = |rates: &[f64]| -> Vec<f64> { rates.iter().map(|v| v * dt).collect() };
+        let deforming = over_step(deforming.as_deref().unwrap_or(velocity));
+        Ok(Motion { moved: over_step(&moving), deforming })
+    }
+
+    /// M~^-1 of sums of this rank's points, with the boundaries' velocity. Collective.
+    fn solve(&mut self, sums: Vec<[f64; D]>) -> Result<Vec<f64>> {
+        timed(&mut self.seconds, || self.inverse.solve(sums, &self.held_velocity))
+    }
+
+    /// The force with the shares of all ranks; what is pushed must have mass. Collective.
+    fn summed_and_carried(&self, force: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
+        let pushed = self.inverse.summed(force)?;
+        let (grid, held) = (&self.model.grid, &self.conditions.fixed);
+        require_mass(self.world, grid, self.mesh, self.mass, held, &pushed)?;
+        Ok(pushed)
+    }
+}
+
+/// Does `work` and adds its wall seconds to `seconds`.
+fn timed<T>(seconds: &mut f64, work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let begin = Instant::now();
+    let outcome = work();
+    *seconds += begin.elapsed().as_secs_f64();
+    outcome
+}
+
+/// share a + (1 - share) b at each point.
+fn blend<const D: usize>(share: f64, a: &[[f64; D]], b: &[[f64; D]]) -> Vec<[f64; D]> {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| std::array::from_fn(|i| share * a[i] + (1.0 - share) * b[i]))
+        .collect()
+}
+
+/// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the
+/// consistent mass, with S+ v_p = M^-1 Σ m S^T v_p by the lumped mass.
+fn sharpen<const D: usize>(
+    inverse: &mut Inverse<'_, D>,
+    step: StepPoints<'_, D>,
+    velocity: Vec<f64>,
+    order: usize,
+    at_rest: &[f64],
+    nodes: usize,
+) -> Result<Vec<f64>> {
+    let mut sum = velocity.clone();
+    let mut term = velocity;
+    for _ in 1..order {
+        let back = mapping::at_points(step, &term);
+        let mapped = inverse.solve(mapping::momentum(step, &back, nodes), at_rest)?;
+        for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
+            *t -= m;
+            *s += *t;
+        }
+    }
+    Ok(sum)
+}
