@@ -24,16 +24,7 @@ use crate::parallel::signals::{self, Signal};
 use crate::points::Points;
 
 use super::discretise::Model;
-
-/// Where a time loop stands when it offers its state.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moment {
-    /// Inside a nominal step that was cut.
-    PartOfStep,
-    Step,
-    /// Nothing is left to do.
-    End,
-}
+use super::stepping::Moment;
 
 /// Writes checkpoints when the deck or a signal asks for them.
 #[derive(Debug)]

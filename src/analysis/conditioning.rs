@@ -15,7 +15,6 @@ use crate::petsc::log::Phase;
 use crate::points::Points;
 
 use super::balance;
-use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::{add_scalar, ghost_matrix};
@@ -23,6 +22,7 @@ use super::extremes::{Extremes, Reduced};
 use super::mapping;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
+use super::stepping::Moment;
 
 /// Moves the bodies in equal increments and records one row for each position.
 pub fn run<const D: usize>(

@@ -4,16 +4,15 @@ use crate::deck::model::Mass;
 use crate::error::{Error, Result};
 use crate::output::RunState;
 use crate::parallel::World;
-use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance;
-use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::Model;
-use super::explicit_step::{Solved, advance};
+use super::explicit_step::advance;
 use super::ledger::{Entry, Ledger, StepSums};
 use super::recorder::{Ending, Recorder};
+use super::step_end::{self, End};
+use super::stepping::Moment;
 use super::time_step::{TimeSteps, stability_limit};
 use super::update;
 
@@ -60,25 +59,25 @@ pub fn run<const D: usize>(
         let (mut solved, sums) = match advance(world, model, points, clock, span) {
             Ok(done) => done,
             Err(Error::Run(why)) => {
+                let culprit = world.first_message(update::not_finite(points));
+                let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
                 before.restore(points);
                 if framed != Some(number - 1) {
                     recorder.frame(world, number - 1, span.time_start, points)?;
                 }
                 recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
-                let culprit = world.first_message(update::not_finite(points));
-                let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
                 let hint = if why.contains("inside out") { unstabilised(model) } else { "" };
                 return Ok(Ending::failed(at(&format!("{why}{detail}{hint}"))));
             }
             Err(other) => return Err(other),
         };
         let entry = Entry::unite(world, points, sums);
-        let mut row = std::mem::take(&mut solved.row);
+        let row = &mut solved.row;
         row.step = number;
-        if let Err(why) = ledger.book(&entry, &mut row) {
+        if let Err(why) = ledger.book(&entry, row) {
             // The row shows what happened.
             row.wall_seconds = clock.elapsed();
-            recorder.step(world, &row, false)?;
+            recorder.step(world, row, false)?;
             let (limit, _) = limit_now(model, points);
             before.restore(points);
             if framed != Some(number - 1) {
@@ -98,27 +97,14 @@ pub fn run<const D: usize>(
         if steps.follows_limit() {
             limit = limit_now(model, points).0;
         }
-        let last = steps.next(limit).is_none();
-        clock.time(Phase::Output, || {
-            if recorder.wants_frame(number, span.time_end, last) {
-                let time = span.time_end;
-                recorder.frame(world, number, time, points)?;
-                framed = Some(number);
-                let Solved { mesh, displacement, reaction, .. } = &solved;
-                recorder.grid_frame(world, model, mesh, number, time, displacement, reaction)?;
-            }
-            Ok(())
-        })?;
-        let busy = clock.busy();
-        let settle = || balance::settle(world, model, points, busy);
-        row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
-        row.wall_seconds = clock.elapsed();
-        clock.time(Phase::Output, || recorder.step(world, &row, false))?;
-        let moment = if last { Moment::End } else { Moment::Step };
+        let moment = if steps.next(limit).is_none() { Moment::End } else { Moment::Step };
+        let end = End { number, label: span.time_end, moment, newton: false };
         let state = state_of(&steps, &ledger);
-        let stop =
-            clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;
-        if let Some(ending) = stop {
+        let finished = step_end::finish(world, model, points, recorder, clock, solved, end, state)?;
+        if finished.framed {
+            framed = Some(number);
+        }
+        if let Some(ending) = finished.stop {
             return Ok(ending);
         }
     }

@@ -19,18 +19,12 @@ use super::grid_mass::{GridMass, Inverse, require_mass};
 use super::ledger::StepSums;
 use super::mapping;
 use super::reactions::reactions;
+use super::step_end::Solved;
 use super::transport::{self, Carrier};
 use super::update::{self, Increments, PointEnergies};
 
-/// A finished step: its row but for the ledger, and the grid as it was solved.
-pub(super) struct Solved<const D: usize> {
-    pub row: HistoryRow,
-    pub mesh: Discretisation<D>,
-    pub displacement: Vec<f64>,
-    pub reaction: Vec<f64>,
-}
-
-/// One time step; the points end at their new state, not yet migrated. Collective.
+/// One time step; the points end at their new state, not yet migrated. The row lacks the ledger's
+/// columns. Collective.
 pub(super) fn advance<const D: usize>(
     world: &World,
     model: &Model<D>,
@@ -248,7 +242,7 @@ pub(super) fn advance<const D: usize>(
         ..mesh.row(world, points)
     };
     let sums = StepSums { energies, ghost, work };
-    Ok((Solved { row, mesh, displacement, reaction }, sums))
+    Ok((Solved { row, mesh, displacement, reaction, moved_grid: None }, sums))
 }
 
 /// Does `work` and adds its wall seconds to `seconds`.

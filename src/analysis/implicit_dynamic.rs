@@ -1,34 +1,33 @@
-//! M~ a' + (1 + α) f'  - α f = 0 with f = f_int + K_G u - f_ext, Newmark's
-//! a' = u/(β dt²) - v/(β dt) - (1/(2β) - 1) a and v' = v + dt ((1 - γ) a + γ a'): implicit
-//! dynamics by Newmark's method (α = 0) or that of Hilber, Hughes and Taylor, over the equations
-//! of the quasi-static analysis (Ghost §2.4) with the stabilised mass (Ghost §3.3).
+//! M~ a' + (1 + α) f'  - α f = 0 with f = f_int + K_G u - f_ext and a' by [`super::newmark`]:
+//! implicit dynamics by Newmark's method (α = 0) or that of Hilber, Hughes and Taylor, over the
+//! equations of the quasi-static analysis (Ghost §2.4) with the stabilised mass (Ghost §3.3).
 //!
 //! Velocity and acceleration come from the points by Ghost eq. 10 and return as increments
 //! (velocity, by the deck's FLIP share) and values (acceleration).
 
-use crate::assembly::conditions::StepSpan;
+use crate::assembly::conditions::{Conditions, StepSpan};
+use crate::assembly::internal::StepPoints;
 use crate::error::{Error, Result};
-use crate::grid::Grid;
 use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::{self};
-use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::{Equilibrium, Inertia};
-use super::grid_mass::GridMass;
+use super::grid_mass::{GridMass, Inverse};
 use super::ledger::{Entry, Ledger, StepSums};
+use super::newmark::{Newmark, PointRates, Rates};
 use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
+use super::step_end::{End, Solved};
 use super::stepping::Stepping;
 use super::time_step::stability_limit;
-use super::{mapping, newton, update};
+use super::{mapping, newton, step_end, update};
 
 /// Runs all time steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -74,14 +73,13 @@ pub fn run<const D: usize>(
         // The points are as they were where a step fails.
         before.record(points, model.deck.method.basis);
         let outcome = match solve_step(world, model, points, recorder, clock, span, number) {
-            Ok(Ok(solved)) => {
-                let mut row = solved.row.clone();
-                let entry = Entry::unite(world, points, solved.sums);
-                match ledger.book(&entry, &mut row) {
-                    Ok(()) => Ok((solved, row)),
+            Ok(Ok(mut step)) => {
+                let entry = Entry::unite(world, points, step.sums);
+                match ledger.book(&entry, &mut step.solved.row) {
+                    Ok(()) => Ok(step),
                     Err(why) => {
                         // The row shows what happened.
-                        recorder.step(world, &row, true)?;
+                        recorder.step(world, &step.solved.row, true)?;
                         Err(Fault::Final(format!(
                             "{why}; smaller steps, or analysis.hht_alpha = -0.1, damp what they \
                              excite"
@@ -93,9 +91,11 @@ pub fn run<const D: usize>(
             Err(Error::Run(why)) => Err(Fault::Final(why)),
             Err(other) => return Err(other),
         };
-        let (solved, mut row) = match outcome {
-            Ok(done) => done,
+        let Step { mut solved, ghost_work, .. } = match outcome {
+            Ok(step) => step,
             Err(fault) => {
+                let culprit = world.first_message(update::not_finite(points));
+                let culprit = culprit.map_or(String::new(), |text| format!(": {text}"));
                 before.restore(points);
                 if let Fault::Step(why) = &fault {
                     recorder.log.say(&format!("step {number} refused: {why}"));
@@ -109,8 +109,6 @@ pub fn run<const D: usize>(
                 }
                 let state = state_of(&stepping, &ledger, ghost_energy);
                 recorder.keep_last_state(world, model, points, state)?;
-                let culprit = world.first_message(update::not_finite(points));
-                let culprit = culprit.map_or(String::new(), |text| format!(": {text}"));
                 let end = format!("t = {:.6e} s", span.time_end);
                 return Ok(match fault {
                     Fault::Step(why) => Ending::stopped(format!(
@@ -124,47 +122,18 @@ pub fn run<const D: usize>(
                 });
             }
         };
-        let ended = stepping.accept();
+        let moment = stepping.accept();
         recorder.steps_completed = stepping.completed();
-        ghost_energy += solved.ghost_work;
-        row.energy_ghost += ghost_energy;
-        row.cuts = stepping.cuts;
-        let last = stepping.next_span().is_none();
-        clock.time(Phase::Output, || {
-            if ended && recorder.wants_frame(number, span.time_end, last) {
-                let time = span.time_end;
-                recorder.frame(world, number, time, points)?;
-                framed = Some(number);
-                let (displacement, reaction) = (&solved.displacement, &solved.reaction);
-                recorder.grid_frame(
-                    world,
-                    model,
-                    &solved.mesh,
-                    number,
-                    time,
-                    displacement,
-                    reaction,
-                )?;
-            }
-            Ok(())
-        })?;
-        if let Some(grid) = solved.moved_grid {
-            model.grid = grid;
-        }
-        let busy = clock.busy();
-        let settle = || balance::settle(world, model, points, busy);
-        row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
-        row.wall_seconds = clock.elapsed();
-        clock.time(Phase::Output, || recorder.step(world, &row, true))?;
-        let moment = match (last, ended) {
-            (true, _) => Moment::End,
-            (_, true) => Moment::Step,
-            (_, false) => Moment::PartOfStep,
-        };
+        ghost_energy += ghost_work;
+        solved.row.energy_ghost += ghost_energy;
+        solved.row.cuts = stepping.cuts;
+        let end = End { number, label: span.time_end, moment, newton: true };
         let state = state_of(&stepping, &ledger, ghost_energy);
-        let stop =
-            clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;
-        if let Some(ending) = stop {
+        let finished = step_end::finish(world, model, points, recorder, clock, solved, end, state)?;
+        if finished.framed {
+            framed = Some(number);
+        }
+        if let Some(ending) = finished.stop {
             return Ok(ending);
         }
     }
@@ -178,41 +147,12 @@ enum Fault {
     Final(String),
 }
 
-/// A finished step: its row but for the ledger, and the grid as it was solved.
-struct Solved<const D: usize> {
-    row: HistoryRow,
+/// A step as it was solved; its row lacks the ledger's columns.
+struct Step<const D: usize> {
+    solved: Solved<D>,
     sums: StepSums,
     /// u K_G u / 2 of the step over all ranks, J.
     ghost_work: f64,
-    mesh: Discretisation<D>,
-    displacement: Vec<f64>,
-    reaction: Vec<f64>,
-    /// The mesh where it goes after the step, if it moves.
-    moved_grid: Option<Grid<D>>,
-}
-
-/// Newmark's numbers for a step of `dt`.
-#[derive(Clone, Copy)]
-struct Newmark {
-    beta: f64,
-    gamma: f64,
-    /// In [-1/3, 0].
-    alpha: f64,
-    dt: f64,
-}
-
-impl Newmark {
-    /// Acceleration and velocity at the end for the increment `u`.
-    fn end(&self, u: f64, v: f64, a: f64) -> (f64, f64) {
-        let Newmark { beta, gamma, dt, .. } = *self;
-        let end = u / (beta * dt * dt) - self.start(v, a);
-        (end, v + dt * ((1.0 - gamma) * a + gamma * end))
-    }
-
-    /// What the acceleration at the end owes to the start, with its sign reversed.
-    fn start(&self, v: f64, a: f64) -> f64 {
-        v / (self.beta * self.dt) + (0.5 / self.beta - 1.0) * a
-    }
 }
 
 /// One time step. The inner `Err` says why it is refused; points are then as they were.
@@ -224,61 +164,30 @@ fn solve_step<const D: usize>(
     clock: &mut Clock,
     span: StepSpan,
     number: usize,
-) -> Result<std::result::Result<Solved<D>, String>> {
+) -> Result<std::result::Result<Step<D>, String>> {
     let deck = &model.deck;
-    let newmark = Newmark {
-        beta: deck.analysis.newmark_beta,
-        gamma: deck.analysis.newmark_gamma,
-        alpha: deck.analysis.hht_alpha,
-        dt: span.time_end - span.time_start,
-    };
+    let newmark = Newmark::new(&deck.analysis, span.time_end - span.time_start);
     let (mesh, conditions) = clock.time(Phase::Locate, || {
         Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
     })?;
     let numbering = &mesh.numbering;
-    let (nodes, owned) = (numbering.len(), numbering.owned * D);
     let step = mesh.step_points(points, &model.materials);
-    let forces_at = |factor, time| model.point_forces(world, points, factor, time);
-    let point_forces_start = forces_at(span.factor_start, span.time_start)?;
-    let external_start = owned_forces(world, numbering, &mesh, &point_forces_start)?;
-    let forces_end = forces_at(span.factor_end, span.time_end)?;
-    let external_end = owned_forces(world, numbering, &mesh, &forces_end)?;
-
     let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
-    let mut held = conditions.fixed.clone();
-    for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {
-        held[local * D..(local + 1) * D].fill(true);
-    }
     let mass =
         clock.time(Phase::Assemble, || GridMass::assemble(world, &mesh, step, deck.method.mass))?;
-    // f_ext - f_int at the start, complete on the owners.
-    let mut balance_start = mapping::force(step, &point_forces_start, &[], nodes);
-    let at_rest = vec![0.0; nodes * D];
-    let held_velocity: Vec<f64> = conditions.increment.iter().map(|u| u / newmark.dt).collect();
-    let (velocity, acceleration) = clock.time(Phase::Solve, || {
-        let mut inverse = mass.inverse(world, &model.grid, &mesh, &held)?;
-        let sums = mapping::momentum(step, &points.velocity, nodes);
-        let velocity = inverse.solve(sums, &held_velocity)?;
-        // The first step has no history: its acceleration is that of the forces.
-        let sums = match span.time_start {
-            0.0 => balance_start.clone(),
-            _ => mapping::momentum(step, &points.acceleration, nodes),
-        };
-        Ok((velocity, inverse.solve(sums, &at_rest)?))
+    let loads = Loads::of_step(world, model, points, &mesh, span)?;
+    let start = clock.time(Phase::Solve, || {
+        let held = held_or_left_out::<D>(&conditions, &left_out);
+        let inverse = mass.inverse(world, &model.grid, &mesh, &held)?;
+        rates_at_start(inverse, step, points, &conditions, &loads, span)
     })?;
-    numbering.halo.reverse_add(world, balance_start.as_flattened_mut(), D)?;
 
-    let predictor: Vec<f64> =
-        velocity.iter().zip(&acceleration).map(|(v, a)| newmark.start(*v, *a)).collect();
-    let mut driving = mass.multiply(&mesh, &predictor);
+    let mut driving = mass.multiply(&mesh, &newmark.predictor(&start));
+    let share = 1.0 + newmark.alpha;
     for (dof, force) in driving.iter_mut().enumerate() {
-        *force += (1.0 + newmark.alpha) * external_end[dof]
-            - newmark.alpha * balance_start.as_flattened()[dof];
+        *force += share * loads.external_end[dof] - newmark.alpha * loads.balance_start[dof];
     }
-    let inertia = Inertia {
-        share: 1.0 + newmark.alpha,
-        matrix: mass.scaled(&mesh, 1.0 / (newmark.beta * newmark.dt.powi(2))),
-    };
+    let inertia = Inertia { share, matrix: mass.scaled(&mesh, newmark.stiffness()) };
     let problem = Equilibrium::new(
         world,
         &mesh,
@@ -295,32 +204,25 @@ fn solve_step<const D: usize>(
         Err(why) => return Ok(Err(why)),
     };
     let displacement = solved.displacement;
+    let Carried { made, moved_grid } =
+        match newton::carried(world, model, &mesh, points, &displacement, span)? {
+            Ok(carried) => carried,
+            Err(why) => return Ok(Err(why)),
+        };
 
-    let carried = match newton::carried(world, model, &mesh, points, &displacement, span)? {
-        Ok(carried) => carried,
-        Err(why) => return Ok(Err(why)),
-    };
-    let Carried { made, moved_grid } = carried;
-
-    let (mut end_acceleration, mut end_velocity) = (at_rest.clone(), at_rest);
-    for dof in 0..nodes * D {
-        (end_acceleration[dof], end_velocity[dof]) =
-            newmark.end(displacement[dof], velocity[dof], acceleration[dof]);
-    }
-    let change: Vec<f64> = end_velocity.iter().zip(&velocity).map(|(new, old)| new - old).collect();
-    let carried = mapping::at_points(step, &end_velocity);
-    let gained = mapping::at_points(step, &change);
-    let new_acceleration = mapping::at_points(step, &end_acceleration);
+    let end = newmark.rates(&start, &displacement);
+    let rates = PointRates::new(step, points, &start, &end, deck.method.flip);
     // What the boundaries supply.
-    let supplied: Vec<f64> = (0..owned).map(|dof| solved.internal[dof] - driving[dof]).collect();
+    let supplied: Vec<f64> =
+        solved.internal.iter().zip(&driving).map(|(force, driving)| force - driving).collect();
     let work = work_of_step::<D>(
         &conditions,
         numbering,
         &displacement,
-        [&external_start, &external_end],
+        [&loads.external_start, &loads.external_end],
         [&supplied, &supplied],
     );
-    let ghost = mass.ghost_energy(&mesh, &end_velocity);
+    let ghost = mass.ghost_energy(&mesh, &end.velocity);
     clock.time(Phase::Update, || {
         let updated = update::apply(
             &model.grid,
@@ -334,13 +236,7 @@ fn solve_step<const D: usize>(
         );
         world.fail_together(updated)
     })?;
-    let flip = deck.method.flip;
-    for ((v, gain), grid) in points.velocity.iter_mut().zip(&gained).zip(&carried) {
-        for i in 0..D {
-            v[i] = flip * (v[i] + gain[i]) + (1.0 - flip) * grid[i];
-        }
-    }
-    points.acceleration = new_acceleration;
+    (points.velocity, points.acceleration) = (rates.velocity, rates.acceleration);
 
     let sums = StepSums { energies: update::energies(points, &model.materials), ghost, work };
     let reaction: Vec<f64> = supplied
@@ -363,23 +259,78 @@ fn solve_step<const D: usize>(
             &deck.boundaries,
             &conditions,
             &supplied,
-            &vec![0.0; owned],
+            &vec![0.0; supplied.len()],
         ),
         ..mesh.row(world, points)
     };
     let ghost_work = solved.ghost_energy;
-    Ok(Ok(Solved { row, sums, ghost_work, mesh, displacement, reaction, moved_grid }))
+    let solved = Solved { row, mesh, displacement, reaction, moved_grid };
+    Ok(Ok(Step { solved, sums, ghost_work }))
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Nodal forces of a step, N: of the owned degrees of freedom.
+struct Loads<const D: usize> {
+    external_start: Vec<f64>,
+    external_end: Vec<f64>,
+    /// f_ext - f_int at the start.
+    balance_start: Vec<f64>,
+    /// This rank's share of it at local nodes.
+    share_at_start: Vec<[f64; D]>,
+}
 
-    #[test]
-    fn newmark_of_the_average_acceleration_is_exact_for_a_constant_one() {
-        let newmark = Newmark { beta: 0.25, gamma: 0.5, alpha: 0.0, dt: 0.3 };
-        let (v, a) = (2.0, -1.5);
-        let (end, velocity) = newmark.end(v * 0.3 + 0.5 * a * 0.09, v, a);
-        assert!((end - a).abs() < 1e-13 && (velocity - (v + 0.3 * a)).abs() < 1e-13);
+impl<const D: usize> Loads<D> {
+    /// Collective.
+    fn of_step(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        mesh: &Discretisation<D>,
+        span: StepSpan,
+    ) -> Result<Self> {
+        let numbering = &mesh.numbering;
+        let forces_start = model.point_forces(world, points, span.factor_start, span.time_start)?;
+        let forces_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
+        let step = mesh.step_points(points, &model.materials);
+        let share_at_start = mapping::force(step, &forces_start, &[], numbering.len());
+        let mut balance_start = share_at_start.as_flattened().to_vec();
+        numbering.halo.reverse_add(world, &mut balance_start, D)?;
+        Ok(Loads {
+            external_start: owned_forces(world, numbering, mesh, &forces_start)?,
+            external_end: owned_forces(world, numbering, mesh, &forces_end)?,
+            balance_start,
+            share_at_start,
+        })
     }
+}
+
+/// Components whose rates the mass does not decide: held ones, and all of nodes left out.
+fn held_or_left_out<const D: usize>(conditions: &Conditions, left_out: &[bool]) -> Vec<bool> {
+    let mut held = conditions.fixed.clone();
+    for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {
+        held[local * D..(local + 1) * D].fill(true);
+    }
+    held
+}
+
+/// Nodal velocity and acceleration from the points' (Ghost eq. 10). Collective.
+fn rates_at_start<const D: usize>(
+    mut inverse: Inverse<'_, D>,
+    step: StepPoints<'_, D>,
+    points: &Points<D>,
+    conditions: &Conditions,
+    loads: &Loads<D>,
+    span: StepSpan,
+) -> Result<Rates> {
+    let nodes = conditions.fixed.len() / D;
+    let dt = span.time_end - span.time_start;
+    let held_velocity: Vec<f64> = conditions.increment.iter().map(|u| u / dt).collect();
+    let velocity =
+        inverse.solve(mapping::momentum(step, &points.velocity, nodes), &held_velocity)?;
+    // The first step has no history: its acceleration is that of the forces.
+    let sums = match span.time_start {
+        0.0 => loads.share_at_start.clone(),
+        _ => mapping::momentum(step, &points.acceleration, nodes),
+    };
+    let acceleration = inverse.solve(sums, &vec![0.0; nodes * D])?;
+    Ok(Rates { velocity, acceleration })
 }

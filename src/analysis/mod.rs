@@ -5,7 +5,7 @@
 //! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
 //! | `explicit` | `explicit.rs`, `explicit_step.rs`, `time_step.rs` | Ghost §2.3, 3.5 |
 //! | what carries the points | `transport.rs` | Ghost eq. 9 |
-//! | `implicit-dynamic` | `implicit_dynamic.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
+//! | `implicit-dynamic` | `implicit_dynamic.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
 //! | points to nodes and back | `mapping.rs` | Ghost eq. 6, 8-10 |
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
@@ -19,6 +19,7 @@
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
 //! | the mesh between steps | `motion.rs` | Rotation §2 (viii) |
 //! | migrate, and a new partition where it pays | `balance.rs` | |
+//! | what every accepted step ends with | `step_end.rs` | |
 //! | cut and grow load steps | `stepping.rs` | |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
@@ -41,6 +42,7 @@ pub mod implicit_dynamic;
 pub mod ledger;
 pub mod mapping;
 pub mod motion;
+pub mod newmark;
 pub mod newton;
 pub mod plan;
 pub mod quasi_static;
@@ -48,6 +50,7 @@ pub mod reactions;
 pub mod recorder;
 pub mod setup;
 pub mod solver;
+pub mod step_end;
 pub mod stepping;
 pub mod support;
 pub mod time_step;

@@ -6,7 +6,6 @@ use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::map_forces;
 use crate::deck::Deck;
 use crate::error::{Error, Result};
-use crate::grid::Grid;
 use crate::output::RunState;
 use crate::output::history::HistoryRow;
 use crate::output::summary::Status;
@@ -14,16 +13,15 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance::{self};
-use super::checkpointing::Moment;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
 use super::newton::Carried;
 use super::reactions::reactions;
 use super::recorder::{Ending, Recorder};
+use super::step_end::{End, Solved};
 use super::stepping::Stepping;
-use super::{newton, update, verify};
+use super::{newton, step_end, update, verify};
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.
@@ -53,69 +51,31 @@ pub fn run<const D: usize>(
     };
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
-        match solve_step(world, model, points, recorder, clock, span, number)? {
-            Ok(solved) => {
-                let ended = stepping.accept();
-                let frame_due = ended
-                    && recorder.wants_frame(
-                        number,
-                        span.factor_end,
-                        stepping.next_span().is_none(),
-                    );
-                recorder.steps_completed = stepping.completed();
-                let mut row = solved.row;
-                totals.work += row.work_external;
-                totals.ghost += row.energy_ghost;
-                (row.work_external, row.energy_ghost) = (totals.work, totals.ghost);
-                row.cuts = stepping.cuts;
-                clock.time(Phase::Output, || {
-                    if frame_due {
-                        recorder.frame(world, number, span.factor_end, points)?;
-                        recorder.grid_frame(
-                            world,
-                            model,
-                            &solved.mesh,
-                            number,
-                            span.factor_end,
-                            &solved.displacement,
-                            &solved.reaction,
-                        )?;
-                    }
-                    Ok(())
-                })?;
-                if let Some(grid) = solved.moved_grid {
-                    model.grid = grid;
-                }
-                let busy = clock.busy();
-                let settle = || balance::settle(world, model, points, busy);
-                row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
-                row.wall_seconds = clock.elapsed();
-                clock.time(Phase::Output, || recorder.step(world, &row, true))?;
-                let moment = match (stepping.next_span(), ended) {
-                    (None, _) => Moment::End,
-                    (_, true) => Moment::Step,
-                    (_, false) => Moment::PartOfStep,
-                };
-                let state = state_of(&stepping, &totals);
-                let stop = clock.time(Phase::Output, || {
-                    recorder.end_step(world, model, points, moment, state)
-                })?;
-                if let Some(ending) = stop {
-                    return Ok(ending);
-                }
-            }
+        let mut solved = match solve_step(world, model, points, recorder, clock, span, number)? {
+            Ok(solved) => solved,
             Err(why) => {
                 recorder.log.say(&format!("step {number} refused: {why}"));
-                if !stepping.refuse() {
-                    let state = state_of(&stepping, &totals);
-                    recorder.keep_last_state(world, model, points, state)?;
-                    return Ok(Ending::stopped(format!(
-                        "step {number} of {steps} could not be solved: {why}; the last finished \
-                         step is {}",
-                        stepping.completed()
-                    )));
+                if stepping.refuse() {
+                    continue;
                 }
+                let state = state_of(&stepping, &totals);
+                recorder.keep_last_state(world, model, points, state)?;
+                return Ok(Ending::stopped(format!(
+                    "step {number} of {steps} could not be solved: {why}; the last finished step \
+                     is {}",
+                    stepping.completed()
+                )));
             }
+        };
+        let moment = stepping.accept();
+        recorder.steps_completed = stepping.completed();
+        totals.add(&mut solved.row);
+        solved.row.cuts = stepping.cuts;
+        let end = End { number, label: span.factor_end, moment, newton: true };
+        let state = state_of(&stepping, &totals);
+        let finished = step_end::finish(world, model, points, recorder, clock, solved, end, state)?;
+        if let Some(ending) = finished.stop {
+            return Ok(ending);
         }
     }
     Ok(Ending::completed())
@@ -135,6 +95,13 @@ struct Totals {
 }
 
 impl Totals {
+    /// Adds a step's work and Ghost energy; its row then tells those of the run.
+    fn add(&mut self, row: &mut HistoryRow) {
+        self.work += row.work_external;
+        self.ghost += row.energy_ghost;
+        (row.work_external, row.energy_ghost) = (self.work, self.ghost);
+    }
+
     fn save(&self, state: &mut RunState) {
         state.set("totals.work", self.work);
         state.set("totals.ghost", self.ghost);
@@ -145,16 +112,6 @@ impl Totals {
         self.ghost = state.number("totals.ghost")?;
         Ok(())
     }
-}
-
-/// A finished step: its row, and the grid as it was solved.
-struct Solved<const D: usize> {
-    row: HistoryRow,
-    mesh: Discretisation<D>,
-    displacement: Vec<f64>,
-    reaction: Vec<f64>,
-    /// The mesh where it goes after the step, if it moves.
-    moved_grid: Option<Grid<D>>,
 }
 
 /// One load step from `span.factor_start` to `factor_end`. The inner `Err` says why the step is

@@ -19,9 +19,10 @@ use crate::output::{
 use crate::parallel::World;
 use crate::points::Points;
 
-use super::checkpointing::{Checkpointer, Moment};
+use super::checkpointing::Checkpointer;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
+use super::stepping::Moment;
 
 /// Open files and running totals of one run.
 pub struct Recorder {

@@ -5,6 +5,16 @@ use crate::deck::model::OnFailure;
 use crate::error::{Error, Result};
 use crate::output::RunState;
 
+/// Where a time loop stands after a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Moment {
+    /// Inside a nominal step that was cut.
+    PartOfStep,
+    Step,
+    /// Nothing is left to do.
+    End,
+}
+
 /// The position in the analysis, counted in ticks so that halving and doubling are exact.
 #[derive(Debug, Clone)]
 pub struct Stepping {
@@ -75,14 +85,20 @@ impl Stepping {
         (self.position / self.ticks_per_step) as usize + 1
     }
 
-    /// Moves on after a success; true at the end of a nominal step.
-    pub fn accept(&mut self) -> bool {
+    /// Moves on after a success.
+    pub fn accept(&mut self) -> Moment {
         self.position += self.size;
         let doubled = 2 * self.size;
         if doubled <= self.ticks_per_step && self.position.is_multiple_of(doubled) {
             self.size = doubled;
         }
-        self.position.is_multiple_of(self.ticks_per_step)
+        if self.position >= self.total() {
+            Moment::End
+        } else if self.position.is_multiple_of(self.ticks_per_step) {
+            Moment::Step
+        } else {
+            Moment::PartOfStep
+        }
     }
 
     /// Answers a failure: true if a smaller step may be tried.
@@ -116,12 +132,13 @@ mod tests {
     #[test]
     fn equal_steps_reach_the_end() {
         let mut stepping = stepping();
-        let mut ends = Vec::new();
+        let (mut ends, mut moments) = (Vec::new(), Vec::new());
         while let Some(span) = stepping.next_span() {
             ends.push((span.factor_end, span.time_end));
-            assert!(stepping.accept());
+            moments.push(stepping.accept());
         }
         assert_eq!(ends, [(0.25, 2.0), (0.5, 4.0), (0.75, 6.0), (1.0, 8.0)]);
+        assert_eq!(moments, [Moment::Step, Moment::Step, Moment::Step, Moment::End]);
         assert_eq!(stepping.completed(), 4);
     }
 
