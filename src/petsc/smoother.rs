@@ -16,8 +16,9 @@ use crate::error::Result;
 
 /// Gives the levels of a GAMG preconditioner their matrices in single precision, where they are
 /// smoothed by Chebyshev's method with Jacobi's; sets the solver up if that is due. Any other
-/// solver is left alone. Collective; `ksp` has its operators.
-pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
+/// solver is left alone. `kept`: the hierarchy is not going to be renewed, and what would only serve
+/// for that is given back. Collective; `ksp` has its operators.
+pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator, kept: bool) -> Result<()> {
     let (mut pc, mut levels) = (null_mut(), 0);
     petsc!(KSPGetPC(ksp, &mut pc))?;
     if !is_type(pc.cast(), sys::PCGAMG)? || !wanted(ksp)? {
@@ -26,6 +27,9 @@ pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
     restore_transfers(ksp, pc)?;
     petsc!(KSPSetUp(ksp))?;
     petsc!(PCMGGetLevels(pc, &mut levels))?;
+    if kept {
+        forget_products(pc, levels)?;
+    }
     for level in 1..levels {
         let mut smoother = null_mut();
         petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
@@ -42,6 +46,19 @@ pub(super) fn compact(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
             petsc!(PCMGSetInterpolation(pc, level, shell.raw()))?;
             petsc!(PCMGSetRestriction(pc, level, shell.raw()))?;
         }
+    }
+    Ok(())
+}
+
+/// Frees what the coarse operators were multiplied out with; the next hierarchy, if there is one
+/// after all, is made from nothing.
+fn forget_products(pc: sys::PC, levels: sys::PetscInt) -> Result<()> {
+    petsc!(PCGAMGSetReuseInterpolation(pc, sys::PETSC_FALSE))?;
+    for level in 0..levels - 1 {
+        let (mut smoother, mut matrix) = (null_mut(), null_mut());
+        petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
+        petsc!(KSPGetOperators(smoother, null_mut(), &mut matrix))?;
+        petsc!(MatProductClear(matrix))?;
     }
     Ok(())
 }

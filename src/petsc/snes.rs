@@ -94,12 +94,17 @@ pub struct Snes {
     forcing: Option<Forcing>,
 }
 
+/// Number of linear solves per preconditioner from which on it is one for all.
+const KEPT: sys::PetscInt = 1000;
+
 /// What the callbacks see during one solve.
 struct Context<'a, P> {
     problem: &'a mut P,
     matrix: &'a mut Matrix,
     comm: &'a SimpleCommunicator,
     forcing: Option<Forcing>,
+    /// One preconditioner serves the whole solve.
+    kept: bool,
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
@@ -179,11 +184,14 @@ impl Snes {
         }
         self.matrix = matrix.id();
         let raw_matrix = matrix.raw();
+        let mut lag = 0;
+        petsc!(SNESGetLagPreconditioner(self.raw, &mut lag))?;
         let mut context = Context {
             problem,
             matrix,
             comm: &self.comm,
             forcing: self.forcing.clone(),
+            kept: lag == -1 || lag >= KEPT,
             error: None,
             diverged: None,
             outside: false,
@@ -328,7 +336,7 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     let result =
         unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
     context.settle(result, |context, ()| {
-        smoother::compact(inner, context.comm)?;
+        smoother::compact(inner, context.comm, context.kept)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, f64::from(sys::PETSC_DEFAULT));
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;
