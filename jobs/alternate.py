@@ -6,7 +6,8 @@
 A host that changes its speed within minutes makes times taken one after the other worthless; runs in
 turn meet the same hours, and the least of several is the one that was disturbed least. What comes
 after `--` goes to both programs. Beside the processor time of all ranks: wall time of the phases as
-`summary.json` has them, and whether the residuals of the two are the same to the last digit.
+`summary.json` has them, and whether the residuals of the two are the same to the last digit. On
+several ranks waiting for each other is processor time too.
 """
 
 import argparse
