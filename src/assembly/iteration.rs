@@ -7,8 +7,9 @@ use crate::parallel::World;
 use super::incomplete::Incomplete;
 use super::{BlockMatrix, Numbering, Pattern, mass};
 
-/// Relative residual of the iteration, in the norm of the preconditioner. What is left of each
-/// step adds up: with `pic` over n steps to about n / 2 times the cells per unit of length in J.
+/// Relative residual of the iteration, in the norm of the preconditioner. That underrates the
+/// error where the factor is poor, at nearly empty nodes most; and what is left of each step adds
+/// up: with `pic`, in J, with the square of the steps.
 const TOLERANCE: f64 = 1e-15;
 /// Where round-off stops the iteration above [`TOLERANCE`], this much is accepted.
 const ACCEPTABLE: f64 = 1e-10;
