@@ -212,7 +212,7 @@ impl Cubic<'_> {
 /// The diagonal part only couples through neighbours' values of the exact solution: rows are
 /// independent but for the matrix, which is what the tests are about.
 impl NewtonProblem for Cubic<'_> {
-    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+    fn residual(&mut self, x: &[f64], f: &mut [f64], _: &mut Matrix) -> Result<bool> {
         for (k, row) in self.own.clone().enumerate() {
             f[k] = if row == 0 { 0.0 } else { x[k].powi(3) - self.exact(row).powi(3) };
         }
@@ -322,7 +322,7 @@ struct Chain<'a> {
 const ENOUGH: f64 = 1e-9;
 
 impl NewtonProblem for Chain<'_> {
-    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+    fn residual(&mut self, x: &[f64], f: &mut [f64], _: &mut Matrix) -> Result<bool> {
         let (matrix, place, product) = &mut self.product;
         place.values_mut()?.copy_from_slice(x);
         matrix.mult(place, product)?;
@@ -585,7 +585,7 @@ struct Membrane {
 }
 
 impl NewtonProblem for Membrane {
-    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
+    fn residual(&mut self, x: &[f64], f: &mut [f64], _: &mut Matrix) -> Result<bool> {
         let (matrix, place, product) = &mut self.product;
         place.values_mut()?.copy_from_slice(x);
         matrix.mult(place, product)?;

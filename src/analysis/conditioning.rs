@@ -4,7 +4,7 @@
 
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::inverse::MassInverse;
-use crate::assembly::{BlockMatrix, internal, mass};
+use crate::assembly::{BlockMatrix, internal, mass, scatter};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -17,7 +17,7 @@ use crate::points::Points;
 use super::balance;
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
-use super::equilibrium::{add_scalar, ghost_matrix};
+use super::equilibrium::ghost_matrix;
 use super::extremes::{Extremes, Reduced};
 use super::mapping;
 use super::reactions::reactions;
@@ -103,7 +103,6 @@ fn study<const D: usize>(
             &deck.boundaries,
             &conditions,
             &none,
-            &none,
         ),
         conditioning: numbers,
         ..mesh.row(world, points)
@@ -152,7 +151,7 @@ impl<const D: usize> System<D> {
         stiffness.reduce(world, pattern)?;
         let mut stiffness_ghost = stiffness.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.stiffness)? {
-            add_scalar(&share, pattern, &mut stiffness_ghost);
+            scatter::add_scalar(&share, pattern, &mut stiffness_ghost);
         }
         Ok(System { mass, mass_ghost, lumped, stiffness, stiffness_ghost })
     }

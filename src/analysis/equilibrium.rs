@@ -227,7 +227,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             None => None,
         };
         self.tangent = Tangent::Stale;
-        self.health = internal::assemble_into(
+        self.health = internal::assemble(
             self.step,
             self.settings.frame,
             numbering,
@@ -282,7 +282,9 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         }
     }
 
-    fn timed_evaluation(
+    /// The residual at `x` into `f`, and the tangent where `matrix` is given; false if `x` must be
+    /// refused. The first evaluation of a step needs the matrix, for the scale of held rows.
+    pub fn evaluate_at(
         &mut self,
         x: &[f64],
         f: &mut [f64],
@@ -337,23 +339,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
 }
 
 impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
-    /// Without the tangent; [`NewtonProblem::jacobian`] then assembles it.
-    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool> {
-        if self.diagonal_scale == 0.0 {
-            self.diagonal_scale = 1.0;
-        }
-        self.timed_evaluation(x, f, None)
-    }
-
     /// With the tangent, unless this is likely the step's last evaluation.
-    fn residual_and_matrix(
-        &mut self,
-        x: &[f64],
-        f: &mut [f64],
-        matrix: &mut Matrix,
-    ) -> Result<bool> {
-        let matrix = if self.expects_convergence() { None } else { Some(matrix) };
-        self.timed_evaluation(x, f, matrix)
+    fn residual(&mut self, x: &[f64], f: &mut [f64], matrix: &mut Matrix) -> Result<bool> {
+        let matrix = (!self.expects_convergence()).then_some(matrix);
+        self.evaluate_at(x, f, matrix)
     }
 
     fn jacobian(&mut self, _x: &[f64], matrix: &mut Matrix) -> Result<()> {
@@ -443,26 +432,6 @@ pub fn ghost_matrix<const D: usize>(
     Ok(Some(matrix))
 }
 
-/// Adds J ⊗ 1 to the owned rows.
-pub fn add_scalar<const D: usize>(
-    scalar: &BlockMatrix<1>,
-    pattern: &Pattern,
-    matrix: &mut BlockMatrix<D>,
-) {
-    for range in pattern.offsets.windows(2).map(|pair| pair[0]..pair[1]) {
-        if range.start >= pattern.ghost_start {
-            break;
-        }
-        let width = range.len();
-        for i in 0..D {
-            let start = D * D * range.start + i * width * D;
-            for position in 0..width {
-                matrix.values[start + position * D + i] += scalar.values[range.start + position];
-            }
-        }
-    }
-}
-
 impl GhostTerm {
     /// force += K_G u over the owned rows.
     fn add_product<const D: usize>(
@@ -481,18 +450,10 @@ impl Inertia {
     /// K = share K + matrix.
     fn join<const D: usize, R: BlockRows<D>>(&self, pattern: &Pattern, owned: usize, rows: &mut R) {
         for row in 0..owned {
-            let range = pattern.offsets[row]..pattern.offsets[row + 1];
-            let width = range.len() * D;
-            let values = rows.values(rows.start(pattern, row), D * width);
-            for (i, line) in values.chunks_exact_mut(width).enumerate() {
-                let blocks = line.chunks_exact_mut(D);
-                for (block, add) in blocks.zip(&self.matrix.values[range.clone()]) {
-                    for value in &mut *block {
-                        *value *= self.share;
-                    }
-                    block[i] += add;
-                }
-            }
+            let blocks = pattern.offsets[row + 1] - pattern.offsets[row];
+            let values = rows.values(rows.start(pattern, row), D * D * blocks);
+            values.iter_mut().for_each(|value| *value *= self.share);
+            scatter::add_scalar_row(&self.matrix, pattern, row, rows);
         }
     }
 }

@@ -68,10 +68,8 @@ pub fn run<const D: usize>(
                 let culprit = world.first_message(update::not_finite(points));
                 let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
                 before.restore(points);
-                if framed != Some(number - 1) {
-                    recorder.frame(world, number - 1, span.time_start, points)?;
-                }
-                recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
+                let (time, state) = (span.time_start, state_of(&steps, &ledger));
+                step_end::leave(world, model, points, recorder, framed, number - 1, time, state)?;
                 let hint = if inverted { unstabilised(model) } else { "" };
                 return Ok(Ending::failed(at(&format!("{why}{detail}{hint}"))));
             }
@@ -85,10 +83,8 @@ pub fn run<const D: usize>(
             recorder.step(world, row, false)?;
             let (limit, _) = limit_now(model, points);
             before.restore(points);
-            if framed != Some(number - 1) {
-                recorder.frame(world, number - 1, span.time_start, points)?;
-            }
-            recorder.keep_last_state(world, model, points, state_of(&steps, &ledger))?;
+            let (time, state) = (span.time_start, state_of(&steps, &ledger));
+            step_end::leave(world, model, points, recorder, framed, number - 1, time, state)?;
             return Ok(Ending::failed(at(&format!(
                 "{why}; the time step {:.3e} s is too large (stability limit of full cells \
                  {limit:.3e} s){}",

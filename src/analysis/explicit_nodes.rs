@@ -62,10 +62,12 @@ pub(super) struct Forces<const D: usize> {
     pub acceleration: Vec<f64>,
 }
 
-/// Nodal increments, m: those that move the points and those that deform them.
+/// Nodal increments, m.
 pub(super) struct Motion {
+    /// They move the points.
     pub moved: Vec<f64>,
-    pub deforming: Vec<f64>,
+    /// With musl, they deform them; else the step's own increments do.
+    pub again: Option<Vec<f64>>,
 }
 
 impl<'a, const D: usize> Nodes<'a, D> {
@@ -151,7 +153,6 @@ impl<'a, const D: usize> Nodes<'a, D> {
 
     /// Updates the stress first, with the nodal `velocity` at the step's start: dF of the points,
     /// and what they hold and lose then. Collective.
-    #[allow(clippy::type_complexity)]
     pub fn deform_first(
         &mut self,
         carrier: Carrier,
@@ -175,8 +176,8 @@ impl<'a, const D: usize> Nodes<'a, D> {
         Ok((deformation, energies))
     }
 
-    /// dt w with w of [`super::transport`], and dt times the velocity that deforms: v', or with
-    /// musl that of the updated points. Collective.
+    /// dt w with w of [`super::transport`], and with musl dt times the velocity of the updated
+    /// points. Collective.
     pub fn motion(
         &mut self,
         carrier: Carrier,
@@ -188,25 +189,27 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let dt = self.dt;
         let musl = self.model.deck.method.stress_update == StressUpdate::Musl;
         let mut moving = velocity.to_vec();
-        let mut deforming = None;
+        let mut again = None;
         if carrier.needs_solve() || musl {
             let sums = mapping::momentum(step, new_velocity, self.mesh.numbering.len());
-            let again = timed(&mut self.seconds, || {
+            let solved = timed(&mut self.seconds, || {
                 self.inverse.solve_near(sums, &self.held_velocity, velocity)
             })?;
             if carrier.needs_solve() {
-                moving.clone_from(&again);
+                moving.clone_from(&solved);
             }
-            deforming = musl.then_some(again);
+            again = musl.then_some(solved);
         }
         if matches!(carrier, Carrier::Start | Carrier::RemappedBack) {
             for (w, a) in moving.iter_mut().zip(acceleration) {
                 *w -= dt * a;
             }
         }
-        let over_step = |rates: &[f64]| -> Vec<f64> { rates.iter().map(|v| v * dt).collect() };
-        let deforming = over_step(deforming.as_deref().unwrap_or(velocity));
-        Ok(Motion { moved: over_step(&moving), deforming })
+        let over_step = |mut rates: Vec<f64>| {
+            rates.iter_mut().for_each(|v| *v *= dt);
+            rates
+        };
+        Ok(Motion { moved: over_step(moving), again: again.map(over_step) })
     }
 
     /// M~^-1 of sums of this rank's points, with the boundaries' velocity. Collective.

@@ -19,7 +19,7 @@ use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
 use super::grid_mass::GridMass;
 use super::ledger::StepSums;
 use super::mapping;
-use super::reactions::reactions;
+use super::reactions::{at_held, reactions};
 use super::step_end::Solved;
 use super::transport::{self, Carrier};
 use super::update::{self, Increments};
@@ -75,14 +75,15 @@ pub(super) fn advance<const D: usize>(
     let (rate, new_velocity) = clock.time(Phase::Update, || {
         Ok(mapping::push(step, &acceleration, &velocity, method.flip, dt))
     })?;
-    let Motion { moved, deforming } =
+    let Motion { moved, again } =
         nodes.motion(carrier, step, &new_velocity, &velocity, &acceleration)?;
+    let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();
+    let deforming = again.as_ref().unwrap_or(&displacement);
     let (deformation, energies) = first.unzip();
     let made =
-        clock.time(Phase::Update, || Ok(increments(step, &moved, &deforming, deformation)))?;
+        clock.time(Phase::Update, || Ok(increments(step, &moved, deforming, deformation)))?;
     clock.time(Phase::Update, || Ok(refuse(world, model, &mesh, points, &made, &moved)))??;
 
-    let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();
     let residual = residual(&mass, &mesh, &acceleration, &pushed);
     let work = point_work(&external, &made.displacement)
         + boundary_work(&conditions, &residual, &displacement);
@@ -112,11 +113,7 @@ pub(super) fn advance<const D: usize>(
         Ok(energies)
     })?;
 
-    let reaction: Vec<f64> = residual
-        .iter()
-        .zip(&conditions.fixed)
-        .map(|(r, fixed)| if *fixed { *r } else { 0.0 })
-        .collect();
+    let reaction = at_held(&conditions, &residual);
     let row = HistoryRow {
         load_factor: span.factor_end,
         time: span.time_end,
@@ -129,7 +126,6 @@ pub(super) fn advance<const D: usize>(
             &deck.boundaries,
             &conditions,
             &residual,
-            &vec![0.0; residual.len()],
         ),
         ..mesh.row(world, points)
     };

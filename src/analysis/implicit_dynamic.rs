@@ -22,7 +22,7 @@ use super::ledger::{Entry, Ledger, StepSums};
 use super::newmark::{Newmark, PointRates, Rates};
 use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
-use super::reactions::reactions;
+use super::reactions::{at_held, reactions};
 use super::recorder::{Ending, Recorder};
 use super::step_end::{End, Solved};
 use super::stepping::Stepping;
@@ -104,11 +104,9 @@ pub fn run<const D: usize>(
                     }
                 }
                 let completed = stepping.completed();
-                if framed != Some(completed) {
-                    recorder.frame(world, completed, span.time_start, points)?;
-                }
                 let state = state_of(&stepping, &ledger, ghost_energy);
-                recorder.keep_last_state(world, model, points, state)?;
+                let time = span.time_start;
+                step_end::leave(world, model, points, recorder, framed, completed, time, state)?;
                 let end = format!("t = {:.6e} s", span.time_end);
                 return Ok(match fault {
                     Fault::Step(why) => Ending::stopped(format!(
@@ -239,11 +237,7 @@ fn solve_step<const D: usize>(
     (points.velocity, points.acceleration) = (rates.velocity, rates.acceleration);
 
     let sums = StepSums { energies: update::energies(points, &model.materials), ghost, work };
-    let reaction: Vec<f64> = supplied
-        .iter()
-        .zip(&conditions.fixed)
-        .map(|(force, fixed)| if *fixed { *force } else { 0.0 })
-        .collect();
+    let reaction = at_held(&conditions, &supplied);
     let row = HistoryRow {
         step: number,
         load_factor: span.factor_end,
@@ -259,7 +253,6 @@ fn solve_step<const D: usize>(
             &deck.boundaries,
             &conditions,
             &supplied,
-            &vec![0.0; supplied.len()],
         ),
         ..mesh.row(world, points)
     };

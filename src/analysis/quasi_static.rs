@@ -17,7 +17,7 @@ use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
 use super::newton::Carried;
-use super::reactions::reactions;
+use super::reactions::{at_held, reactions};
 use super::recorder::{Ending, Recorder};
 use super::step_end::{End, Solved};
 use super::stepping::Stepping;
@@ -181,9 +181,9 @@ fn solve_step<const D: usize>(
     })?;
     let energies = update::energies(points, &model.materials);
     let sums = world.sum_slice(&[energies.strain, energies.plastic, work]);
-    let reaction: Vec<f64> = (0..numbering.owned * D)
-        .map(|dof| if conditions.fixed[dof] { internal[dof] - external_end[dof] } else { 0.0 })
-        .collect();
+    let supplied: Vec<f64> =
+        internal.iter().zip(&external_end).map(|(force, external)| force - external).collect();
+    let reaction = at_held(&conditions, &supplied);
     let row = HistoryRow {
         step: number,
         load_factor: span.factor_end,
@@ -202,8 +202,7 @@ fn solve_step<const D: usize>(
             numbering,
             &deck.boundaries,
             &conditions,
-            &internal,
-            &external_end,
+            &supplied,
         ),
         ..mesh.row(world, points)
     };

@@ -8,16 +8,16 @@ use crate::grid::Grid;
 use crate::output::history::Reaction;
 use crate::parallel::World;
 
-/// Sums f = f_int - f_ext over the degrees of freedom each boundary holds. The torque is about
-/// the boundary's centre of rotation, else about the origin. Collective.
+/// Sums what each boundary supplies over the degrees of freedom it holds; `supplied`: f_int - f_ext
+/// of the owned ones, N. The torque is about the boundary's centre of rotation, else about the
+/// origin. Collective.
 pub fn reactions<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     numbering: &Numbering,
     boundaries: &[Boundary],
     conditions: &Conditions,
-    internal: &[f64],
-    external: &[f64],
+    supplied: &[f64],
 ) -> Vec<Reaction> {
     boundaries
         .iter()
@@ -34,7 +34,7 @@ pub fn reactions<const D: usize>(
                 let mut force = [0.0; 3];
                 while at < members.len() && members[at] as usize / D == node {
                     let dof = members[at] as usize;
-                    force[dof % D] = internal[dof] - external[dof];
+                    force[dof % D] = supplied[dof];
                     at += 1;
                 }
                 let x = grid.node_position(numbering.nodes[node]);
@@ -47,5 +47,14 @@ pub fn reactions<const D: usize>(
             let sums = world.sum_slice(&sums);
             Reaction { force: [sums[0], sums[1], sums[2]], sum_abs: sums[3], torque: sums[4] }
         })
+        .collect()
+}
+
+/// The nodal force that boundaries supply where they hold, N; zero elsewhere.
+pub fn at_held(conditions: &Conditions, supplied: &[f64]) -> Vec<f64> {
+    supplied
+        .iter()
+        .zip(&conditions.fixed)
+        .map(|(force, fixed)| if *fixed { *force } else { 0.0 })
         .collect()
 }

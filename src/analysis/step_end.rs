@@ -83,3 +83,22 @@ pub fn finish<const D: usize>(
         clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;
     Ok(Finished { framed, stop })
 }
+
+/// What a run leaves that ends behind step `completed`, at time `label`, as the next one cannot be
+/// finished: a frame unless `framed` says that there is one, and the state. Collective.
+#[allow(clippy::too_many_arguments)]
+pub fn leave<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    recorder: &mut Recorder,
+    framed: Option<usize>,
+    completed: usize,
+    label: f64,
+    state: RunState,
+) -> Result<()> {
+    if framed != Some(completed) {
+        recorder.frame(world, completed, label, points)?;
+    }
+    recorder.keep_last_state(world, model, points, state)
+}

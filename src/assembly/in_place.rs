@@ -8,7 +8,7 @@
 
 use crate::error::{Error, Result};
 
-use super::scatter::{BlockMatrix, BlockRows};
+use super::scatter::{BlockMatrix, BlockRows, add_scalar_row};
 use super::{Numbering, Pattern};
 
 /// So many rows before a row is cleared its memory is asked for.
@@ -166,15 +166,7 @@ impl<'a, const B: usize> InPlace<'a, B> {
     #[cold]
     #[inline(never)]
     fn add_base(&mut self, pattern: &Pattern, row: usize, base: &BlockMatrix<1>) {
-        let range = pattern.offsets[row]..pattern.offsets[row + 1];
-        let width = range.len() * B;
-        let values = self.values(self.layout.starts[row], B * width);
-        for i in 0..B {
-            let line = &mut values[i * width..(i + 1) * width];
-            for (block, add) in line.chunks_exact_mut(B).zip(&base.values[range.clone()]) {
-                block[i] += add;
-            }
-        }
+        add_scalar_row(base, pattern, row, self);
     }
 
     /// Copies the rows of the border into the solver's arrays; `other` holds the values in

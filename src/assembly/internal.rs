@@ -10,7 +10,7 @@ use crate::points::Points;
 
 use super::kernel::{Batch, multiply_add};
 use super::scatter::BlockRows;
-use super::{BlockMatrix, Numbering, Pattern};
+use super::{Numbering, Pattern};
 
 /// What a step's points look like to the equations: fixed while the step is solved.
 #[derive(Clone, Copy)]
@@ -59,20 +59,7 @@ impl Health {
 ///
 /// `step.groups` are the first supports of `pattern`, in its order. Sums are rounded as the
 /// processor's instruction set allows, in the same order on every call.
-pub fn assemble<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    numbering: &Numbering,
-    pattern: &Pattern,
-    displacement: &[f64],
-    force: &mut [f64],
-    stiffness: Option<&mut BlockMatrix<D>>,
-) -> Result<Health> {
-    assemble_into(step, frame, numbering, pattern, displacement, force, stiffness)
-}
-
-/// [`assemble`] into rows stored anywhere.
-pub fn assemble_into<const D: usize, R: BlockRows<D>>(
+pub fn assemble<const D: usize, R: BlockRows<D>>(
     step: StepPoints<'_, D>,
     frame: Frame,
     numbering: &Numbering,

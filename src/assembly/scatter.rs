@@ -89,6 +89,36 @@ impl<const B: usize> BlockMatrix<B> {
     }
 }
 
+/// Adds J ⊗ 1 to the owned rows.
+pub fn add_scalar<const B: usize>(
+    scalar: &BlockMatrix<1>,
+    pattern: &Pattern,
+    matrix: &mut BlockMatrix<B>,
+) {
+    let owned = pattern.offsets.partition_point(|&start| start < pattern.ghost_start);
+    for row in 0..owned {
+        add_scalar_row(scalar, pattern, row, matrix);
+    }
+}
+
+/// Adds J ⊗ 1 to one row.
+pub fn add_scalar_row<const B: usize, R: BlockRows<B>>(
+    scalar: &BlockMatrix<1>,
+    pattern: &Pattern,
+    row: usize,
+    rows: &mut R,
+) {
+    let range = pattern.offsets[row]..pattern.offsets[row + 1];
+    let width = range.len() * B;
+    let values = rows.values(rows.start(pattern, row), B * width);
+    for i in 0..B {
+        let line = &mut values[i * width..(i + 1) * width];
+        for (block, add) in line.chunks_exact_mut(B).zip(&scalar.values[range.clone()]) {
+            block[i] += add;
+        }
+    }
+}
+
 /// Sends the ghost rows to their owners, who add them in ascending rank order. Collective.
 pub fn reduce<const B: usize, R: BlockRows<B>>(
     world: &World,

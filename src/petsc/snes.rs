@@ -34,19 +34,10 @@ pub enum Verdict {
 /// `Diverged` returned by some ranks only takes effect on all of them *after* the callback.
 pub trait NewtonProblem {
     /// F(x) into `f`. `Ok(false)`: x is outside the domain of the function; a line search then
-    /// shortens the step, otherwise the solve ends unconverged.
-    fn residual(&mut self, x: &[f64], f: &mut [f64]) -> Result<bool>;
-
-    /// As [`Self::residual`], which it calls. A problem that assembles both at once may write into
-    /// the matrix as well: nobody multiplies with the values of the last iterate any more.
-    fn residual_and_matrix(
-        &mut self,
-        x: &[f64],
-        f: &mut [f64],
-        _matrix: &mut Matrix,
-    ) -> Result<bool> {
-        self.residual(x, f)
-    }
+    /// shortens the step, otherwise the solve ends unconverged. A problem that assembles both at
+    /// once may write into the matrix as well: nobody multiplies with the values of the last
+    /// iterate any more.
+    fn residual(&mut self, x: &[f64], f: &mut [f64], matrix: &mut Matrix) -> Result<bool>;
 
     /// Updates the values of the matrix for x.
     fn jacobian(&mut self, x: &[f64], matrix: &mut Matrix) -> Result<()>;
@@ -301,7 +292,7 @@ unsafe extern "C" fn residual<P: NewtonProblem>(
     // SAFETY: PETSc's vectors live through the call and are distinct.
     let result = unsafe { Values::of(x) }.and_then(|x| {
         let mut f = unsafe { ValuesMut::of(f) }?;
-        context.problem.residual_and_matrix(&x, &mut f, context.matrix)
+        context.problem.residual(&x, &mut f, context.matrix)
     });
     context.settle(result, |context, inside| {
         context.outside = context.largest(i32::from(!inside)) == 1;

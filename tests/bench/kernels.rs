@@ -364,11 +364,11 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         let x = &displacement[..owned];
         match part {
             0 => {
-                let sound = problem.residual_and_matrix(x, &mut f, &mut matrix);
+                let sound = problem.residual(x, &mut f, &mut matrix);
                 assert!(sound.is_ok_and(|sound| sound));
             }
             1 => problem.jacobian(x, &mut matrix).expect("the matrix has its pattern"),
-            _ => assert!(problem.residual(x, &mut f).is_ok_and(|sound| sound)),
+            _ => assert!(problem.evaluate_at(x, &mut f, None).is_ok_and(|sound| sound)),
         }
     });
     let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);

@@ -91,16 +91,23 @@ fn a_point_that_leaves_the_grid_is_named_and_the_last_state_written() {
     }
 }
 
-/// A domain that would reach out of the grid while its point is still inside refuses the implicit
-/// step that takes it there, which is cut and tried again before the run gives up.
-#[test]
-fn a_domain_that_leaves_the_grid_refuses_the_implicit_step() {
-    const SPEED: f64 = 1.02;
+/// m/s.
+const SPEED: f64 = 1.02;
+
+/// A block of a point a cell that moves towards the left edge of the grid.
+fn towards_the_edge() -> Run {
     let block = format!(
         "shape = {{ box = {{ min = [2, 2], max = [4, 4] }} }}\npoints_per_cell = 1\n\
          velocity = [\"-{SPEED:?}\", \"0\"]"
     );
-    let leaving = blocks(&[&block])
+    blocks(&[&block])
+}
+
+/// A domain that would reach out of the grid while its point is still inside refuses the implicit
+/// step that takes it there, which is cut and tried again before the run gives up.
+#[test]
+fn a_domain_that_leaves_the_grid_refuses_the_implicit_step() {
+    let leaving = towards_the_edge()
         .set("analysis={ type = \"implicit-dynamic\", steps = 10, duration = 3 }")
         .set("analysis.on_failure=\"cut\"")
         .set("analysis.smallest_step=0.25")
@@ -128,12 +135,7 @@ fn a_domain_that_leaves_the_grid_refuses_the_implicit_step() {
 /// The explicit step that takes a domain out of the grid is the one that fails, not the next.
 #[test]
 fn a_domain_that_leaves_the_grid_ends_the_explicit_step() {
-    const SPEED: f64 = 1.02;
-    let block = format!(
-        "shape = {{ box = {{ min = [2, 2], max = [4, 4] }} }}\npoints_per_cell = 1\n\
-         velocity = [\"-{SPEED:?}\", \"0\"]"
-    );
-    let leaving = blocks(&[&block])
+    let leaving = towards_the_edge()
         .set("analysis={ type = \"explicit\", steps = 100, duration = 3 }")
         .set("ghost.mass_factor=0.25");
     for (basis, update, ranks) in [("cpdi1", "usl", 1), ("cpdi1", "usf", 2), ("cpdi2", "usl", 1)] {
