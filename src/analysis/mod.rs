@@ -12,13 +12,13 @@
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
 //! | rigid motions held? | `support.rs` | |
-//! | map and number: the grid side of a step | `discretise.rs` | Ghost Figure 1 a-c |
+//! | locate, map and number: the grid side of a step | `discretise.rs` (`grid/locate.rs`) | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
 //! | Newton's method for a step | `newton.rs` | |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
 //! | the mesh between steps | `motion.rs` | Rotation §2 (viii) |
-//! | migrate, and a new partition where it pays | `balance.rs` | |
+//! | migrate, and a new partition where it pays | `balance.rs` (`parallel/migrate.rs`) | |
 //! | what every accepted step ends with | `step_end.rs` | |
 //! | cut and grow load steps | `stepping.rs` | |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
