@@ -9,6 +9,7 @@
 //! | `input.toml` | [`deck`] |
 //! | load steps, time steps (Ghost §2.3, 2.4; Lagrangian §6.3, 6.5) | [`analysis`] |
 //! | results | [`output`] |
+//! | (d) multigrid's levels | [`multigrid`] |
 //! | (b, c) points to grid, system of equations (Lagrangian eq. 27-29) | [`assembly`] |
 //! | Ghost faces and their matrix (Ghost §3, §4) | [`ghost`] |
 //! | who owns what, migration | [`parallel`] |
@@ -30,6 +31,7 @@ pub mod ghost;
 pub mod grid;
 pub mod material;
 pub mod mechanics;
+pub mod multigrid;
 pub mod output;
 pub mod parallel;
 pub mod petsc;

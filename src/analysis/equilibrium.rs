@@ -14,7 +14,10 @@ use crate::assembly::scatter::{self, BlockRows};
 use crate::assembly::{BlockMatrix, Numbering, Pattern, mass};
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
+use crate::grid::Grid;
+use crate::multigrid::{self, Assembled};
 use crate::parallel::World;
+use crate::petsc::Hierarchy;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::{NewtonProblem, Verdict};
 use crate::points::Points;
@@ -35,6 +38,7 @@ pub struct NewtonSettings {
 /// the local ones (owned, then ghosts).
 pub struct Equilibrium<'a, const D: usize> {
     world: &'a World,
+    grid: &'a Grid<D>,
     numbering: &'a Numbering,
     pattern: &'a Pattern,
     step: StepPoints<'a, D>,
@@ -96,6 +100,7 @@ enum Tangent {
 impl<'a, const D: usize> Equilibrium<'a, D> {
     pub fn new(
         world: &'a World,
+        grid: &'a Grid<D>,
         mesh: &'a Discretisation<D>,
         step: StepPoints<'a, D>,
         conditions: &Conditions,
@@ -124,6 +129,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let beside = vec![0.0; layout.len_beside()];
         Ok(Equilibrium {
             world,
+            grid,
             numbering,
             pattern,
             step,
@@ -409,6 +415,13 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
 
     fn excess(&self) -> f64 {
         self.errors.last().map_or(f64::INFINITY, |error| error / self.settings.tolerance)
+    }
+
+    fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
+        let (own, other) = matrix.storage()?;
+        let other = other.as_deref().unwrap_or(&[]);
+        let rows = Assembled::new(self.numbering, self.pattern, &own, other);
+        multigrid::of_system(self.world, self.grid, self.numbering, &rows)
     }
 }
 

@@ -188,6 +188,7 @@ fn solve_step<const D: usize>(
     let inertia = Inertia { share, matrix: mass.scaled(&mesh, newmark.stiffness()) };
     let problem = Equilibrium::new(
         world,
+        &model.grid,
         &mesh,
         step,
         &conditions,

@@ -140,6 +140,7 @@ fn solve_step<const D: usize>(
     let step = mesh.step_points(points, &model.materials);
     let problem = Equilibrium::new(
         world,
+        &model.grid,
         &mesh,
         step,
         &conditions,

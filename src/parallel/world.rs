@@ -108,6 +108,13 @@ impl World {
         if self.is_root() { 0 } else { result as usize }
     }
 
+    /// The values of all ranks, in their order.
+    pub fn gather(&self, value: u64) -> Vec<u64> {
+        let mut all = vec![0; self.size()];
+        reducing(|| self.comm.all_gather_into(&value, &mut all[..]));
+        all
+    }
+
     /// True on all ranks if true on any.
     pub fn any(&self, value: bool) -> bool {
         let mut result = 0i32;

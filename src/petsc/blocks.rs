@@ -86,6 +86,22 @@ impl Blocks {
         Some(Blocks { shape, rows, offsets: starts, columns: blocks, values })
     }
 
+    /// No rows yet, in blocks of `size`: 2x2, 2x3, or multiples of 3, which are kept as 3x3.
+    pub fn growing(size: [usize; 2]) -> Option<Growing> {
+        let shape = match size {
+            [r, c] if r % 3 == 0 && c % 3 == 0 && r * c > 0 => Shape::Three,
+            _ => Shape::of(size)?,
+        };
+        let blocks = Blocks {
+            shape,
+            rows: None,
+            offsets: vec![0],
+            columns: Vec::new(),
+            values: Vec::new(),
+        };
+        Some(Growing { blocks, filled: Vec::new(), count: 0 })
+    }
+
     /// Rounds the `values` of the compressed rows of [`Self::of_pattern`], the same `offsets`.
     pub fn fill(&mut self, offsets: &[i32], values: &[f64]) {
         by_shape!(self, fill_of[](offsets, values));
@@ -202,6 +218,53 @@ impl Blocks {
     #[inline(always)]
     fn row(&self, k: usize) -> usize {
         self.rows.as_ref().map_or(k, |rows| rows[k] as usize)
+    }
+}
+
+/// [`Blocks`] that are given row by row.
+pub struct Growing {
+    blocks: Blocks,
+    filled: Vec<u32>,
+    count: u32,
+}
+
+impl Growing {
+    /// Appends a row of `R` x `C` blocks, each with its column.
+    pub fn push<const R: usize, const C: usize>(&mut self, row: &[(usize, [[f64; C]; R])]) {
+        let (tall, wide) = match self.blocks.shape {
+            Shape::Two => (2, 2),
+            Shape::Three => (3, 3),
+            Shape::TwoByThree => (2, 3),
+        };
+        for first in (0..R).step_by(tall) {
+            for (column, block) in row {
+                for left in (0..C).step_by(wide) {
+                    self.blocks.columns.push((column * (C / wide) + left / wide) as u32);
+                    let lines = &block[first..first + tall];
+                    if self.blocks.shape == Shape::Two {
+                        let values = lines.iter().flat_map(|line| &line[left..left + wide]);
+                        self.blocks.values.extend(values.map(|&value| value as f32));
+                    } else {
+                        let columns = left..left + wide;
+                        let values = columns.flat_map(|c| lines.iter().map(move |line| line[c]));
+                        self.blocks.values.extend(values.map(|value| value as f32));
+                    }
+                }
+            }
+            if !row.is_empty() {
+                self.filled.push(self.count);
+                self.blocks.offsets.push(self.blocks.columns.len() as u32);
+            }
+            self.count += 1;
+        }
+    }
+
+    pub fn finish(self) -> Blocks {
+        let Growing { mut blocks, filled, count } = self;
+        blocks.values.extend([0.0; BEYOND]);
+        blocks.values.shrink_to_fit();
+        blocks.rows = (filled.len() < count as usize).then_some(filled);
+        blocks
     }
 }
 

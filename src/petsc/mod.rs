@@ -20,14 +20,17 @@
 //! Every constructor and every method that talks to a communicator is collective. Objects that
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
+mod block_product;
 mod blocks;
 mod check;
 mod forcing;
+mod hierarchy;
 pub mod known;
 pub mod ksp;
 pub mod log;
 pub mod matrix;
 pub mod options;
+mod object;
 mod product;
 pub mod session;
 mod smoother;
@@ -35,9 +38,11 @@ pub mod snes;
 pub mod sys;
 pub mod vector;
 
+pub use block_product::BlockProduct;
 pub use blocks::Blocks;
 pub use check::agree;
 pub use forcing::Forcing;
+pub use hierarchy::{CoarsestRows, Hierarchy, Smoothed};
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
 pub use session::{Session, abort_all, version};

@@ -9,6 +9,7 @@ use mpi::traits::{AsRaw, CommunicatorCollectives};
 
 use super::blocks::{Blocks, block_of};
 use super::check::{check, keep, petsc, running};
+use super::object::Object;
 use super::sys;
 use super::vector::{Values, ValuesMut, index};
 use crate::error::Result;
@@ -294,34 +295,6 @@ impl Drop for Rows {
     fn drop(&mut self) {
         // An error here would be the matrix's end, which its users will meet.
         let _ = self.pass(sys::MatRestoreRowIJ);
-    }
-}
-
-/// One reference to a PETSc object.
-struct Object<T: Handle>(T);
-
-trait Handle: Copy {
-    fn object(self) -> sys::PetscObject;
-}
-
-macro_rules! handles {
-    ($($name:ty),*) => {
-        $(impl Handle for $name {
-            fn object(self) -> sys::PetscObject {
-                self.cast()
-            }
-        })*
-    };
-}
-handles!(sys::Mat, sys::Vec, sys::IS, sys::VecScatter);
-
-impl<T: Handle> Drop for Object<T> {
-    fn drop(&mut self) {
-        let mut object = self.0.object();
-        if !object.is_null() && running() {
-            // SAFETY: this reference is ours.
-            unsafe { sys::PetscObjectDestroy(&mut object) };
-        }
     }
 }
 

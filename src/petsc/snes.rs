@@ -15,6 +15,7 @@ use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
 use super::ksp;
 use super::vector::{Values, ValuesMut, index};
+use super::hierarchy::{self, Hierarchy};
 use super::{Ksp, Matrix, Vector, smoother, sys};
 use crate::error::{Error, Result};
 
@@ -56,6 +57,12 @@ pub trait NewtonProblem {
     fn excess(&self) -> f64 {
         f64::INFINITY
     }
+
+    /// Levels for a preconditioner of type `mg`, for the values that the matrix has. `None`: there
+    /// are none for it.
+    fn hierarchy(&mut self, _matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
+        Ok(None)
+    }
 }
 
 /// How a nonlinear solve ended.
@@ -96,6 +103,8 @@ struct Context<'a, P> {
     forcing: Option<Forcing>,
     /// One preconditioner serves the whole solve.
     kept: bool,
+    /// State of the matrix that multigrid's levels were made for.
+    levels: Option<sys::PetscObjectState>,
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
@@ -183,6 +192,7 @@ impl Snes {
             comm: &self.comm,
             forcing: self.forcing.clone(),
             kept: lag == -1 || lag >= KEPT,
+            levels: None,
             error: None,
             diverged: None,
             outside: false,
@@ -254,7 +264,7 @@ impl Drop for Snes {
     }
 }
 
-impl<P> Context<'_, P> {
+impl<P: NewtonProblem> Context<'_, P> {
     /// Makes the ranks agree; an error is kept for `solve` and stops PETSc's loop.
     fn settle<T>(
         &mut self,
@@ -268,6 +278,26 @@ impl<P> Context<'_, P> {
                 sys::PETSC_ERR_USER as sys::PetscErrorCode
             }
         }
+    }
+
+    /// Makes multigrid's levels for the matrix as it is, unless those there are shall serve on.
+    fn renew_levels(&mut self, inner: sys::KSP) -> Result<()> {
+        let (mut kept, mut state) = (sys::PETSC_FALSE, 0);
+        petsc!(KSPGetReusePreconditioner(inner, &mut kept))?;
+        petsc!(PetscObjectStateGet(self.matrix.raw().cast(), &mut state))?;
+        let due = match self.levels {
+            None => true,
+            Some(made) => kept == sys::PETSC_FALSE && made != state,
+        };
+        if !due || !hierarchy::wanted(inner)? {
+            return Ok(());
+        }
+        let made = self.problem.hierarchy(self.matrix);
+        if let Some(made) = agree(self.comm, made)? {
+            hierarchy::install(inner, self.comm, made)?;
+        }
+        self.levels = Some(state);
+        Ok(())
     }
 
     /// Largest of the ranks' numbers.
@@ -327,6 +357,7 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     let result =
         unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
     context.settle(result, |context, ()| {
+        context.renew_levels(inner)?;
         smoother::compact(inner, context.comm, context.kept)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, f64::from(sys::PETSC_DEFAULT));

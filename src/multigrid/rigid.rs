@@ -1,0 +1,31 @@
+//! Motions of a coarse node: displacement of its root and rotation about it, the rigid-body modes
+//! that smoothed aggregation has to keep. A node of a coarser level has three degrees of freedom in
+//! the plane and six in space.
+
+/// What a motion of the coarse node does to a node at `offset` (m) from its root: u = t + w x r, with
+/// rotations in units of one over `length`. `ratio`: that length of the finer level over this one's,
+/// for nodes that rotate themselves.
+pub fn carried<const K: usize, const C: usize>(
+    offset: [f64; 3],
+    length: f64,
+    ratio: f64,
+) -> [[f64; C]; K] {
+    let [x, y, z] = offset.map(|value| value / length);
+    let mut motion = [[0.0; C]; K];
+    let dimension = if C == 3 { 2 } else { 3 };
+    for axis in 0..dimension {
+        motion[axis][axis] = 1.0;
+    }
+    if dimension == 2 {
+        motion[0][2] = -y;
+        motion[1][2] = x;
+    } else {
+        (motion[0][4], motion[0][5]) = (z, -y);
+        (motion[1][3], motion[1][5]) = (-z, x);
+        (motion[2][3], motion[2][4]) = (y, -x);
+    }
+    for k in dimension..K {
+        motion[k][k] = ratio;
+    }
+    motion
+}

@@ -1,0 +1,263 @@
+//! y = A x and y = A^T x by the rows of one rank in blocks of single precision, with the columns of
+//! other ranks apart: values to keep, and the PETSc matrix that multiplies with them.
+
+use std::ffi::c_void;
+use std::ptr::null_mut;
+
+use mpi::topology::SimpleCommunicator;
+use mpi::traits::AsRaw;
+
+use super::blocks::Blocks;
+use super::check::{keep, petsc};
+use super::object::Object;
+use super::sys;
+use super::vector::{Values, ValuesMut, index};
+use crate::error::{Error, Result};
+
+/// The rows of one rank.
+#[derive(Debug, Clone)]
+pub struct BlockProduct {
+    own: Blocks,
+    other: Blocks,
+    /// Global block column of each column of `other`.
+    ghosts: Vec<i32>,
+    /// Scalar rows, and columns of this rank.
+    size: [usize; 2],
+    /// Columns in a block.
+    wide: usize,
+}
+
+impl BlockProduct {
+    /// `rows` block rows of `R` x `C` blocks; `row` appends those of one to the list it is given,
+    /// each with its column: below `own_columns` one of this rank, from there on one of `ghosts`.
+    ///
+    /// # Panics
+    /// If blocks of this size have no kernel: 2x2, 2x3 and multiples of 3 have.
+    pub fn collect<const R: usize, const C: usize>(
+        rows: usize,
+        own_columns: usize,
+        ghosts: Vec<i32>,
+        mut row: impl FnMut(usize, &mut Vec<(usize, [[f64; C]; R])>),
+    ) -> Self {
+        let new = || Blocks::growing([R, C]).expect("blocks with a kernel");
+        let (mut own, mut other) = (new(), new());
+        let (mut inside, mut outside) = (Vec::new(), Vec::new());
+        for k in 0..rows {
+            inside.clear();
+            outside.clear();
+            row(k, &mut inside);
+            inside.retain(|&(column, block)| {
+                let here = column < own_columns;
+                if !here {
+                    outside.push((column - own_columns, block));
+                }
+                here
+            });
+            own.push(&inside);
+            other.push(&outside);
+        }
+        BlockProduct {
+            own: own.finish(),
+            other: other.finish(),
+            ghosts,
+            size: [rows * R, own_columns * C],
+            wide: C,
+        }
+    }
+
+    /// y = A x with the ghosts' values behind the own ones in `x`.
+    pub fn multiply_local(&self, x: &[f64], y: &mut [f64]) {
+        let (own, ghosts) = x.split_at(self.size[1]);
+        self.own.multiply(own, y);
+        if !self.ghosts.is_empty() {
+            self.other.multiply_add(ghosts, y);
+        }
+    }
+}
+
+/// One reference to a PETSc shell matrix over a [`BlockProduct`].
+pub(super) struct Shell(Object<sys::Mat>);
+
+/// What the shell multiplies by.
+struct Context {
+    product: BlockProduct,
+    diagonal: Vec<f64>,
+    ghosts: Option<Ghosts>,
+}
+
+/// Values of other ranks.
+struct Ghosts {
+    scatter: Object<sys::VecScatter>,
+    values: Object<sys::Vec>,
+}
+
+impl Shell {
+    /// `diagonal`: of a square matrix, else empty. Collective.
+    pub(super) fn new(
+        comm: &SimpleCommunicator,
+        product: BlockProduct,
+        diagonal: Vec<f64>,
+    ) -> Result<Self> {
+        let [rows, columns] = [index(product.size[0])?, index(product.size[1])?];
+        let mut shell = Object(null_mut());
+        let data = Box::new(Context { product, diagonal, ghosts: None });
+        let data = Box::into_raw(data);
+        let all = sys::PETSC_DETERMINE;
+        petsc!(MatCreateShell(
+            comm.as_raw(), rows, columns, all, all, data.cast::<c_void>(), &mut shell.0
+        ))?;
+        petsc!(MatShellSetContextDestroy(shell.0, Some(destroy)))?;
+        // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls each, by its
+        // place among the operations, as what it is.
+        let (once, add, twice, diagonal) = unsafe {
+            (
+                std::mem::transmute::<Apply, unsafe extern "C" fn()>(multiply),
+                std::mem::transmute::<Sum, unsafe extern "C" fn()>(multiply_add),
+                std::mem::transmute::<Apply, unsafe extern "C" fn()>(transposed),
+                std::mem::transmute::<Get, unsafe extern "C" fn()>(get_diagonal),
+            )
+        };
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT, Some(once)))?;
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT_ADD, Some(add)))?;
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT_TRANSPOSE, Some(twice)))?;
+        petsc!(MatShellSetOperation(shell.0, sys::MATOP_GET_DIAGONAL, Some(diagonal)))?;
+        petsc!(MatSetUp(shell.0))?;
+        let mut parallel = 1;
+        // SAFETY: a live communicator, and a place for the answer.
+        unsafe { mpi::ffi::MPI_Comm_size(comm.as_raw(), &mut parallel) };
+        if parallel > 1 {
+            // SAFETY: the box above; nobody multiplies yet.
+            let context = unsafe { &mut *data };
+            context.ghosts = Some(Ghosts::new(shell.0, &context.product)?);
+        }
+        Ok(Shell(shell))
+    }
+
+    pub(super) fn raw(&self) -> sys::Mat {
+        self.0.0
+    }
+}
+
+impl Ghosts {
+    fn new(shell: sys::Mat, product: &BlockProduct) -> Result<Self> {
+        let (mut wanted, mut own) = (Object(null_mut()), Object(null_mut()));
+        let (mut values, mut scatter) = (Object(null_mut()), Object(null_mut()));
+        // SAFETY: a constant of a running MPI.
+        let alone = unsafe { mpi::ffi::RSMPI_COMM_SELF };
+        let (wide, count) = (index(product.wide)?, index(product.ghosts.len())?);
+        let all = index(product.ghosts.len() * product.wide)?;
+        let (list, copy) = (product.ghosts.as_ptr(), sys::PETSC_COPY_VALUES);
+        petsc!(ISCreateBlock(alone, wide, count, list, copy, &mut wanted.0))?;
+        petsc!(MatCreateVecs(shell, &mut own.0, null_mut()))?;
+        petsc!(VecCreateSeq(alone, all, &mut values.0))?;
+        petsc!(VecScatterCreate(own.0, wanted.0, values.0, null_mut(), &mut scatter.0))?;
+        let _: (Object<sys::IS>, Object<sys::Vec>) = (wanted, own);
+        Ok(Ghosts { scatter, values })
+    }
+}
+
+impl Context {
+    /// y = A x, or y += A x; the ghosts' values travel while the own part is multiplied.
+    fn multiply(&self, x: sys::Vec, y: sys::Vec, add: bool) -> Result<()> {
+        let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
+        if let Some(ghosts) = &self.ghosts {
+            petsc!(VecScatterBegin(ghosts.scatter.0, x, ghosts.values.0, insert, forward))?;
+        }
+        {
+            // SAFETY: PETSc's vectors live through the call and are distinct, as `MatMult` asks.
+            let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
+            if add {
+                self.product.own.multiply_add(&x, &mut y);
+            } else {
+                self.product.own.multiply(&x, &mut y);
+            }
+        }
+        if let Some(ghosts) = &self.ghosts {
+            petsc!(VecScatterEnd(ghosts.scatter.0, x, ghosts.values.0, insert, forward))?;
+            // SAFETY: as above; the ghosts are this object's.
+            let (values, mut y) = unsafe { (Values::of(ghosts.values.0)?, ValuesMut::of(y)?) };
+            self.product.other.multiply_add(&values, &mut y);
+        }
+        Ok(())
+    }
+
+    /// y = A^T x.
+    fn multiply_transposed(&self, x: sys::Vec, y: sys::Vec) -> Result<()> {
+        let (add, back) = (sys::ADD_VALUES, sys::SCATTER_REVERSE);
+        {
+            // SAFETY: as in `multiply`.
+            let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
+            self.product.own.multiply_transposed(&x, &mut y);
+            if let Some(ghosts) = &self.ghosts {
+                // SAFETY: as in `multiply`.
+                let mut values = unsafe { ValuesMut::of(ghosts.values.0)? };
+                self.product.other.multiply_transposed(&x, &mut values);
+            }
+        }
+        if let Some(ghosts) = &self.ghosts {
+            petsc!(VecScatterBegin(ghosts.scatter.0, ghosts.values.0, y, add, back))?;
+            petsc!(VecScatterEnd(ghosts.scatter.0, ghosts.values.0, y, add, back))?;
+        }
+        Ok(())
+    }
+}
+
+type Apply = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
+type Sum = unsafe extern "C" fn(sys::Mat, sys::Vec, sys::Vec, sys::Vec) -> sys::PetscErrorCode;
+type Get = unsafe extern "C" fn(sys::Mat, sys::Vec) -> sys::PetscErrorCode;
+
+// A panic cannot pass the C code below these functions: `extern "C"` turns it into an abort.
+
+unsafe extern "C" fn multiply(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
+    with_context(shell, |context| context.multiply(x, y, false))
+}
+
+/// z = y + A x, where z may be y.
+unsafe extern "C" fn multiply_add(
+    shell: sys::Mat,
+    x: sys::Vec,
+    y: sys::Vec,
+    z: sys::Vec,
+) -> sys::PetscErrorCode {
+    with_context(shell, |context| {
+        if y != z {
+            petsc!(VecCopy(y, z))?;
+        }
+        context.multiply(x, z, true)
+    })
+}
+
+unsafe extern "C" fn transposed(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
+    with_context(shell, |context| context.multiply_transposed(x, y))
+}
+
+unsafe extern "C" fn get_diagonal(shell: sys::Mat, diagonal: sys::Vec) -> sys::PetscErrorCode {
+    with_context(shell, |context| {
+        // SAFETY: PETSc's vector lives through the call.
+        let mut values = unsafe { ValuesMut::of(diagonal)? };
+        if values.len() != context.diagonal.len() {
+            return Err(Error::Environment("this matrix has no diagonal".into()));
+        }
+        values.copy_from_slice(&context.diagonal);
+        Ok(())
+    })
+}
+
+/// Acts on the context of a shell of ours.
+fn with_context(
+    shell: sys::Mat,
+    act: impl FnOnce(&Context) -> Result<()>,
+) -> sys::PetscErrorCode {
+    let mut data: *mut c_void = null_mut();
+    let outcome = petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
+        // SAFETY: the box that `Shell::new` gave up lives as long as the shell.
+        act(unsafe { &*data.cast::<Context>() })
+    });
+    outcome.map_or_else(|error| keep(&error), |()| 0)
+}
+
+unsafe extern "C" fn destroy(data: *mut c_void) -> sys::PetscErrorCode {
+    // SAFETY: the box that `Shell::new` gave up, and PETSc calls this once.
+    drop(unsafe { Box::from_raw(data.cast::<Context>()) });
+    0
+}

@@ -1,0 +1,89 @@
+//! Multigrid's cycle (`-<prefix>pc_type mg`) on levels that the program makes.
+//!
+//! PETSc runs the cycle, with its smoothers and coarse solver under the usual options
+//! (`-<prefix>mg_levels_ksp_type`, `-<prefix>mg_coarse_pc_type`, ...). Smoothers, residuals and
+//! transfers multiply by matrices in single precision: they stream from memory, and have less
+//! than half the bytes. The iteration outside keeps the exact matrix, so the answer is the same.
+
+use std::ptr::null_mut;
+
+use mpi::topology::SimpleCommunicator;
+
+use super::block_product::{BlockProduct, Shell};
+use super::check::petsc;
+use super::matrix::Matrix;
+use super::sys;
+use crate::error::Result;
+
+/// Levels from the finest to the last but one, and the last.
+pub struct Hierarchy {
+    pub levels: Vec<Smoothed>,
+    pub coarsest: CoarsestRows,
+}
+
+/// A level with a smoother.
+pub struct Smoothed {
+    /// Its matrix A.
+    pub product: BlockProduct,
+    /// One over the diagonal of the owned rows, zero where that is not positive.
+    pub inverse: Vec<f64>,
+    /// Largest eigenvalue of D^-1 A.
+    pub largest: f64,
+    /// P, from the next level to this one.
+    pub transfer: BlockProduct,
+}
+
+/// This rank's rows of the last level, compressed: global columns, ascending.
+#[derive(Debug, Default)]
+pub struct CoarsestRows {
+    pub block: usize,
+    pub offsets: Vec<i32>,
+    pub columns: Vec<i32>,
+    pub values: Vec<f64>,
+}
+
+/// Chebyshev's smoother takes care of the eigenvalues between these shares of the largest, as
+/// PETSc's own multigrid has it.
+const SMOOTHED: [f64; 2] = [0.1, 1.1];
+
+/// Whether the solver's preconditioner is a cycle on given levels.
+pub(super) fn wanted(ksp: sys::KSP) -> Result<bool> {
+    let (mut pc, mut same) = (null_mut(), sys::PETSC_FALSE);
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    petsc!(PetscObjectTypeCompare(pc.cast(), sys::PCMG.as_ptr().cast(), &mut same))?;
+    Ok(same != sys::PETSC_FALSE)
+}
+
+/// Puts the levels under a solver with operators; whatever it had goes. Collective.
+pub(super) fn install(
+    ksp: sys::KSP,
+    comm: &SimpleCommunicator,
+    hierarchy: Hierarchy,
+) -> Result<()> {
+    let Hierarchy { levels, coarsest } = hierarchy;
+    let count = levels.len() as sys::PetscInt;
+    let mut pc = null_mut();
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
+    petsc!(PCSetType(pc, sys::PCMG.as_ptr().cast()))?;
+    petsc!(PCMGSetLevels(pc, count + 1, null_mut()))?;
+    for (level, smoothed) in (1..=count).rev().zip(levels) {
+        let Smoothed { product, inverse, largest, transfer } = smoothed;
+        let mut smoother = null_mut();
+        petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
+        let diagonal = inverse.iter().map(|&v| if v > 0.0 { 1.0 / v } else { 0.0 }).collect();
+        let matrix = Shell::new(comm, product, diagonal)?;
+        petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
+        let [low, high] = SMOOTHED.map(|share| share * largest);
+        petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
+        let transfer = Shell::new(comm, transfer, Vec::new())?;
+        petsc!(PCMGSetInterpolation(pc, level, transfer.raw()))?;
+        petsc!(PCMGSetRestriction(pc, level, transfer.raw()))?;
+    }
+    let CoarsestRows { block, offsets, columns, values } = coarsest;
+    let matrix = Matrix::from_csr(comm, block, offsets.len() - 1, &offsets, &columns, &values)?;
+    let mut coarse = null_mut();
+    petsc!(PCMGGetCoarseSolve(pc, &mut coarse))?;
+    petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))?;
+    petsc!(PCSetFromOptions(pc))
+}
