@@ -155,13 +155,13 @@ fn solve_robustly<const D: usize>(
 ) -> Result<(NewtonOutcome, Option<String>)> {
     let linear = Linear::of::<D>(equations, stabilised);
     let most = problem.settings().max_evaluations;
-    let mut snes = solver::newton(world, linear, equations, null_pivots, most)?;
+    let mut snes = solver::newton(world, linear, null_pivots, most)?;
     let outcome = snes.solve(problem, matrix, solution)?;
     let Some(stronger) = linear.stronger::<D>(equations).filter(|_| outcome.linear_failure) else {
         return Ok((outcome, None));
     };
     let before = snes.ksp()?.describe()?;
-    let mut snes = solver::newton(world, stronger, equations, null_pivots, most)?;
+    let mut snes = solver::newton(world, stronger, null_pivots, most)?;
     let after = snes.ksp()?.describe()?;
     if before == after {
         // The user's options chose both.

@@ -11,7 +11,6 @@ use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
-use crate::petsc::options;
 use crate::petsc::snes::Snes;
 
 /// Equations up to which the direct solver is the default in 2D and 3D, with Ghost stiffness.
@@ -20,10 +19,6 @@ const DIRECT_STABILISED: [usize; 2] = [20_000, 6_000];
 const DIRECT_UNSTABILISED: [usize; 2] = [400_000, 60_000];
 /// Up to here the direct solver runs on one rank.
 const ONE_RANK: [usize; 2] = [150_000, 30_000];
-
-/// Equations up to which multigrid's coarse operators are made with a dense row to sum into, as
-/// long as the coarse level is wide: some megabytes at most.
-const DENSE_ROW: usize = 5_000_000;
 
 /// The built-in solvers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,17 +76,12 @@ impl Linear {
                 ("pc_factor_mat_solver_type", PACKAGE),
                 ("snes_lag_preconditioner", "1"),
             ],
-            // Point Jacobi takes the rows without entries that coarse levels have where an
-            // aggregate holds fewer nodes than there are rigid-body modes; SOR does not. The
-            // first iterate's hierarchy serves the whole step.
+            // The first iterate's hierarchy serves the whole step.
             Linear::Multigrid => &[
                 ("ksp_type", "cg"),
                 ("ksp_rtol", "1e-8"),
                 ("ksp_max_it", "1000"),
-                ("pc_type", "gamg"),
-                ("pc_gamg_threshold", "0.02"),
-                ("mg_levels_ksp_type", "chebyshev"),
-                ("mg_levels_pc_type", "jacobi"),
+                ("pc_type", "mg"),
                 ("snes_lag_preconditioner", "1000"),
             ],
         };
@@ -104,36 +94,22 @@ impl Linear {
     }
 }
 
-/// Newton's method with a built-in linear solver for `equations` unknowns. `null_pivots`: the
+/// Newton's method with a built-in linear solver. `null_pivots`: the
 /// system may be singular and consistent, and a direct solver has to look for zero pivots.
 pub fn newton(
     world: &World,
     linear: Linear,
-    equations: usize,
     null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
     snes.set_defaults(&linear.options(world.size()))?;
-    options::set_default("matptap_via", coarse_product(world.size(), equations))?;
     if null_pivots && linear != Linear::Multigrid {
         let inner = if linear.gathers(world.size()) { "telescope_" } else { "" };
         snes.set_defaults(&[(&format!("{inner}mat_mumps_icntl_24"), "1")])?;
     }
     snes.set_from_options()?;
     Ok(snes)
-}
-
-/// How a coarse operator is multiplied out. One rank: through the transposed transfer matrix, in
-/// six tenths of the time of PETSc's own choice. Several ranks, whose matrices know other words: their
-/// own choice, by hash tables, takes ten times as long as the dense row and five times as long as
-/// the merged sparse one.
-fn coarse_product(ranks: usize, equations: usize) -> &'static str {
-    match ranks {
-        1 => "rap",
-        _ if equations <= DENSE_ROW => "nonscalable",
-        _ => "scalable",
-    }
 }
 
 /// The system's matrix with the given values, block size and near-null space. Collective.

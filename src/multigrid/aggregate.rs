@@ -40,8 +40,8 @@ const ROOT: f64 = 2.0;
 
 impl Aggregates {
     /// Collective.
-    pub fn find(world: &World, nodes: &Nodes, strong: &Strong) -> Result<Self> {
-        let state = roots(world, nodes, strong)?;
+    pub fn find(world: &World, nodes: &Nodes, strong: &Strong, distance: usize) -> Result<Self> {
+        let state = roots(world, nodes, strong, distance)?;
         let roots: Vec<u32> =
             (0..nodes.owned as u32).filter(|&node| state[node as usize] == ROOT).collect();
         let (first, total) = (world.exclusive_sum(roots.len()), world.sum_usize(roots.len()));
@@ -109,7 +109,7 @@ impl Aggregates {
 }
 
 /// The state of each local node: [`ROOT`] or [`OUT`].
-fn roots(world: &World, nodes: &Nodes, strong: &Strong) -> Result<Vec<f64>> {
+fn roots(world: &World, nodes: &Nodes, strong: &Strong, distance: usize) -> Result<Vec<f64>> {
     let mut state = nodes.key.clone();
     for (node, state) in state.iter_mut().enumerate().take(nodes.owned) {
         if strong.of_node(node).is_empty() {
@@ -125,7 +125,7 @@ fn roots(world: &World, nodes: &Nodes, strong: &Strong) -> Result<Vec<f64>> {
     let candidate = |state: f64| state != OUT && state != ROOT;
     while world.any(state[..nodes.owned].iter().any(|&state| candidate(state))) {
         for (node, near) in near.iter_mut().enumerate().take(nodes.owned) {
-            *near = highest(&state, node);
+            *near = if distance == 1 { state[node] } else { highest(&state, node) };
         }
         nodes.halo.forward(world, &mut near, 1)?;
         for node in 0..nodes.owned {

@@ -5,7 +5,7 @@ use crate::parallel::{HaloPlan, World, exchange};
 
 use super::aggregate::Aggregates;
 use super::level::{BlockRows, Nodes, Rows};
-use super::prolongator::{Prolongator, add_product};
+use super::prolongator::{Prolongator, add_product, multiply_add};
 
 /// The next level.
 pub struct Coarse<const C: usize> {
@@ -129,6 +129,34 @@ fn multiply<const K: usize, const C: usize>(
     seen: &Seen,
     sums: &mut Sums<C>,
 ) {
+    #[cfg(target_arch = "x86_64")]
+    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        // SAFETY: the processor has just said that it knows the instructions.
+        return unsafe { multiply_avx2(owned, rows, prolongator, seen, sums) };
+    }
+    multiply_in::<K, C, false>(owned, rows, prolongator, seen, sums);
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn multiply_avx2<const K: usize, const C: usize>(
+    owned: usize,
+    rows: &impl Rows<K>,
+    prolongator: &Prolongator<K, C>,
+    seen: &Seen,
+    sums: &mut Sums<C>,
+) {
+    multiply_in::<K, C, true>(owned, rows, prolongator, seen, sums);
+}
+
+#[inline(always)]
+fn multiply_in<const K: usize, const C: usize, const FUSED: bool>(
+    owned: usize,
+    rows: &impl Rows<K>,
+    prolongator: &Prolongator<K, C>,
+    seen: &Seen,
+    sums: &mut Sums<C>,
+) {
     const NONE: u32 = u32::MAX;
     let places: Vec<u32> =
         prolongator.columns.iter().map(|&number| seen.place(number) as u32).collect();
@@ -149,12 +177,12 @@ fn multiply<const K: usize, const C: usize>(
                     columns.push(place);
                     products.push([[0.0; C]; K]);
                 }
-                add_product(&mut products[at as usize], block, value);
+                add_product::<K, K, C, FUSED>(&mut products[at as usize], block, value);
             }
         });
         for (&place, left) in places[range.clone()].iter().zip(&prolongator.values[range]) {
             for (&column, right) in columns.iter().zip(&products) {
-                add_transposed_product(sums.block(place as usize, column), left, right);
+                add_transposed_product::<K, C, FUSED>(sums.block(place as usize, column), left, right);
             }
         }
         columns.iter().for_each(|&place| slot[place as usize] = NONE);
@@ -165,15 +193,15 @@ fn multiply<const K: usize, const C: usize>(
 
 /// sum += a^T b.
 #[inline(always)]
-fn add_transposed_product<const K: usize, const C: usize>(
+fn add_transposed_product<const K: usize, const C: usize, const FUSED: bool>(
     sum: &mut [[f64; C]; C],
     a: &[[f64; C]; K],
     b: &[[f64; C]; K],
 ) {
-    for (a, b) in a.iter().zip(b) {
-        for (sum, &a) in sum.iter_mut().zip(a) {
-            for (sum, b) in sum.iter_mut().zip(b) {
-                *sum += a * b;
+    for r in 0..C {
+        for k in 0..K {
+            for c in 0..C {
+                sum[r][c] = multiply_add::<FUSED>(a[k][r], b[k][c], sum[r][c]);
             }
         }
     }

@@ -33,7 +33,7 @@ use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed};
 
 use aggregate::Aggregates;
 use galerkin::Coarse;
-use prolongator::{Lengths, Prolongator};
+use prolongator::{Lengths, Parts, Prolongator};
 use strength::Strong;
 
 /// Degrees of freedom that are few enough to be solved directly.
@@ -42,7 +42,9 @@ const COARSEST: usize = 600;
 const LEAST_GAIN: f64 = 0.8;
 const MOST_LEVELS: usize = 12;
 /// Couplings below this share are weak.
-const THRESHOLD: f64 = 0.02;
+const THRESHOLD: f64 = 0.04;
+/// Of the prolongator's smoothing, over the largest eigenvalue.
+const DAMPING: f64 = 1.5;
 
 /// The hierarchy under an assembled system of displacements. Collective.
 pub fn of_system<const D: usize>(
@@ -84,13 +86,13 @@ pub fn build<const K: usize, const C: usize>(
     rows: &impl Rows<K>,
 ) -> Result<Option<Hierarchy>> {
     let mut levels = Vec::new();
-    let Some((level, mut coarse, mut length)) = coarsen::<K, C>(world, nodes, rows, 1.0, 1.0)?
+    let Some((level, mut coarse, mut length)) = coarsen::<K, C>(world, nodes, rows, 1.0, 1.0, 2)?
     else {
         return Ok(None);
     };
     levels.push(level);
     while levels.len() < MOST_LEVELS && world.sum_usize(coarse.nodes.owned) * C > COARSEST {
-        let next = coarsen::<C, C>(world, &coarse.nodes, &coarse.rows, length, LEAST_GAIN)?;
+        let next = coarsen::<C, C>(world, &coarse.nodes, &coarse.rows, length, LEAST_GAIN, 1)?;
         let Some((level, coarser, coarser_length)) = next else { break };
         levels.push(level);
         (coarse, length) = (coarser, coarser_length);
@@ -106,9 +108,10 @@ fn coarsen<const K: usize, const C: usize>(
     rows: &impl Rows<K>,
     length: f64,
     gain: f64,
+    distance: usize,
 ) -> Result<Option<(Smoothed, Coarse<C>, f64)>> {
     let strong = Strong::of(world, nodes, rows, THRESHOLD)?;
-    let aggregates = Aggregates::find(world, nodes, &strong)?;
+    let aggregates = Aggregates::find(world, nodes, &strong, distance)?;
     let all = world.sum_usize(nodes.owned);
     if aggregates.total == 0 || aggregates.total as f64 > gain * all as f64 {
         return Ok(None);
@@ -126,10 +129,10 @@ fn coarsen<const K: usize, const C: usize>(
     }
     let largest = spectrum::largest::<K>(world, nodes, &product, &inverse)?;
     let lengths = Lengths::measured(world, nodes, &aggregates, length);
-    let damping = if largest > 0.0 { 4.0 / (3.0 * largest) } else { 0.0 };
-    let prolongator = Prolongator::<K, C>::smoothed(
-        world, nodes, rows, &strong, &aggregates, lengths, &inverse, damping,
-    )?;
+    let damping = if largest > 0.0 { DAMPING / largest } else { 0.0 };
+    let parts =
+        Parts { nodes, strong: &strong, aggregates: &aggregates, lengths, inverse: &inverse, damping };
+    let prolongator = Prolongator::<K, C>::smoothed(world, rows, &parts)?;
     let coarse = galerkin::coarse_operator(world, nodes, rows, &prolongator, &aggregates)?;
     let transfer = transfer(nodes, &prolongator, &coarse.nodes);
     let level = Smoothed { product, inverse, largest, transfer };
@@ -139,7 +142,8 @@ fn coarsen<const K: usize, const C: usize>(
 /// A level's matrix for the cycle.
 fn product<const K: usize>(nodes: &Nodes, rows: &impl Rows<K>) -> BlockProduct {
     let ghosts = nodes.global[nodes.owned..].to_vec();
-    BlockProduct::collect::<K, K>(nodes.owned, nodes.owned, ghosts, |row, blocks| {
+    let blocks = (0..nodes.owned).map(|row| rows.columns(row).len()).sum();
+    BlockProduct::collect::<K, K>(nodes.owned, nodes.owned, ghosts, blocks, |row, blocks| {
         rows.visit(row, |column, block| blocks.push((column, *block)));
     })
 }
@@ -152,7 +156,8 @@ fn transfer<const K: usize, const C: usize>(
 ) -> BlockProduct {
     let first = coarse.first();
     let ghosts = &coarse.global[coarse.owned..];
-    BlockProduct::collect::<K, C>(fine.owned, coarse.owned, ghosts.to_vec(), |row, blocks| {
+    let count = prolongator.offsets[fine.owned];
+    BlockProduct::collect::<K, C>(fine.owned, coarse.owned, ghosts.to_vec(), count, |row, blocks| {
         let (columns, values) = prolongator.row(row);
         blocks.extend(columns.iter().zip(values).map(|(&number, block)| {
             let own = number.wrapping_sub(first) as usize;

@@ -40,76 +40,101 @@ fn offset(position: [f64; 3], root: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|k| position[k] - root[k])
 }
 
+/// What P is made of.
+pub struct Parts<'a> {
+    pub nodes: &'a Nodes,
+    pub strong: &'a Strong,
+    pub aggregates: &'a Aggregates,
+    pub lengths: Lengths,
+    /// One over the diagonal of the owned rows.
+    pub inverse: &'a [f64],
+    /// omega
+    pub damping: f64,
+}
+
+impl Parts<'_> {
+    /// What the motion of a group's coarse node does to a node; `free`: see [`free`].
+    #[inline(always)]
+    fn motion<const K: usize, const C: usize>(
+        &self,
+        node: usize,
+        group: &Group,
+        free: &[f64],
+    ) -> [[f64; C]; K] {
+        let offset = offset(self.nodes.position[node], group.root);
+        let ratio = self.lengths.fine / self.lengths.coarse;
+        let mut motion = rigid::carried(offset, self.lengths.coarse, ratio);
+        for (line, free) in motion.iter_mut().zip(&free[node * K..]) {
+            line.iter_mut().for_each(|value| *value *= free);
+        }
+        motion
+    }
+}
+
 impl<const K: usize, const C: usize> Prolongator<K, C> {
-    /// `inverse`: one over the diagonal of the owned rows; `damping`: omega. Collective.
-    pub fn smoothed(
-        world: &World,
-        nodes: &Nodes,
-        rows: &impl Rows<K>,
-        strong: &Strong,
-        aggregates: &Aggregates,
-        lengths: Lengths,
-        inverse: &[f64],
-        damping: f64,
-    ) -> Result<Self> {
-        let free = free(world, nodes, rows)?;
-        let motion = |node: usize, group: &Group| -> [[f64; C]; K] {
-            let offset = offset(nodes.position[node], group.root);
-            let ratio = lengths.fine / lengths.coarse;
-            let mut motion = rigid::carried(offset, lengths.coarse, ratio);
-            for (line, free) in motion.iter_mut().zip(&free[node * K..]) {
-                line.iter_mut().for_each(|value| *value *= free);
-            }
-            motion
-        };
-        let own: Vec<Option<[[f64; C]; K]>> = (0..nodes.len())
-            .map(|node| aggregates.group[node].as_ref().map(|group| motion(node, group)))
-            .collect();
+    /// Collective.
+    pub fn smoothed(world: &World, rows: &impl Rows<K>, parts: &Parts) -> Result<Self> {
+        let free = free(world, parts.nodes, rows)?;
         let mut prolongator =
             Prolongator { offsets: vec![0], columns: Vec::new(), values: Vec::new() };
-        for row in 0..nodes.owned {
-            let begin = prolongator.columns.len();
-            let Some(group) = &aggregates.group[row] else {
-                prolongator.offsets.push(begin);
+        prolongator.smooth(rows, parts, &free);
+        prolongator.fetch_ghosts(world, parts.nodes)?;
+        Ok(prolongator)
+    }
+
+    /// The owned rows.
+    fn smooth(&mut self, rows: &impl Rows<K>, parts: &Parts, free: &[f64]) {
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+            // SAFETY: the processor has just said that it knows the instructions.
+            return unsafe { self.smooth_avx2(rows, parts, free) };
+        }
+        self.smooth_in::<false>(rows, parts, free);
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn smooth_avx2(&mut self, rows: &impl Rows<K>, parts: &Parts, free: &[f64]) {
+        self.smooth_in::<true>(rows, parts, free);
+    }
+
+    #[inline(always)]
+    fn smooth_in<const FUSED: bool>(&mut self, rows: &impl Rows<K>, parts: &Parts, free: &[f64]) {
+        for row in 0..parts.nodes.owned {
+            let begin = self.columns.len();
+            let Some(group) = parts.aggregates.group[row] else {
+                self.offsets.push(begin);
                 continue;
             };
-            prolongator.columns.push(group.number);
-            prolongator.values.push([[0.0; C]; K]);
-            let mut couplings = strong.of_node(row).iter().map(|&(node, _)| node as usize).peekable();
+            self.columns.push(group.number);
+            self.values.push([[0.0; C]; K]);
+            let mut couplings = parts.strong.of_node(row).iter().peekable();
             rows.visit(row, |column, block| {
-                let is_strong = couplings.next_if_eq(&column).is_some();
-                let other = aggregates.group[column].as_ref().zip(own[column].as_ref());
+                let strong = couplings.next_if(|(node, _)| *node as usize == column).is_some();
                 // A weak neighbour counts as a member of this node's group: the rigid-body modes
                 // stay, and the rows short.
-                let moved = match other {
-                    Some((other, moved)) if is_strong || other.number == group.number => {
-                        (other.number, *moved)
-                    }
-                    _ => (group.number, motion(column, group)),
-                };
-                let known = prolongator.columns[begin..].iter().position(|&c| c == moved.0);
-                let place = begin + known.unwrap_or_else(|| {
-                    prolongator.columns.push(moved.0);
-                    prolongator.values.push([[0.0; C]; K]);
-                    prolongator.columns.len() - begin - 1
-                });
-                add_product(&mut prolongator.values[place], block, &moved.1);
+                let other = parts.aggregates.group[column].filter(|_| strong).unwrap_or(group);
+                let known = self.columns[begin..].iter().position(|&c| c == other.number);
+                let place = begin + known.unwrap_or(self.columns.len() - begin);
+                if known.is_none() {
+                    self.columns.push(other.number);
+                    self.values.push([[0.0; C]; K]);
+                }
+                let motion = parts.motion::<K, C>(column, &other, free);
+                add_product::<K, K, C, FUSED>(&mut self.values[place], block, &motion);
             });
-            for (k, values) in prolongator.values[begin..].iter_mut().enumerate() {
+            for values in &mut self.values[begin..] {
                 for (r, line) in values.iter_mut().enumerate() {
-                    let factor = -damping * inverse[row * K + r] * free[row * K + r];
+                    let factor = -parts.damping * parts.inverse[row * K + r] * free[row * K + r];
                     line.iter_mut().for_each(|value| *value *= factor);
                 }
-                if let (0, Some(own)) = (k, &own[row]) {
-                    for (value, own) in values.iter_mut().flatten().zip(own.iter().flatten()) {
-                        *value += own;
-                    }
-                }
             }
-            prolongator.offsets.push(prolongator.columns.len());
+            let own = parts.motion::<K, C>(row, &group, free);
+            for (value, own) in self.values[begin].iter_mut().flatten().zip(own.iter().flatten()) {
+                *value += own;
+            }
+            self.offsets.push(self.columns.len());
         }
-        prolongator.fetch_ghosts(world, nodes)?;
-        Ok(prolongator)
     }
 
     /// Appends the rows of the ghosts.
@@ -150,20 +175,25 @@ impl<const K: usize, const C: usize> Prolongator<K, C> {
     }
 }
 
-/// sum += a b.
+/// sum += a b, each term rounded once where the instruction set can (`FUSED`).
 #[inline(always)]
-pub fn add_product<const K: usize, const M: usize, const C: usize>(
+pub fn add_product<const K: usize, const M: usize, const C: usize, const FUSED: bool>(
     sum: &mut [[f64; C]; K],
     a: &[[f64; M]; K],
     b: &[[f64; C]; M],
 ) {
-    for (sum, a) in sum.iter_mut().zip(a) {
-        for (&a, b) in a.iter().zip(b) {
-            for (sum, b) in sum.iter_mut().zip(b) {
-                *sum += a * b;
+    for r in 0..K {
+        for m in 0..M {
+            for c in 0..C {
+                sum[r][c] = multiply_add::<FUSED>(a[r][m], b[m][c], sum[r][c]);
             }
         }
     }
+}
+
+#[inline(always)]
+pub fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// 1 for a degree of freedom that is coupled to others, 0 for one that is held: it does not take

@@ -30,6 +30,7 @@ pub struct BlockProduct {
 impl BlockProduct {
     /// `rows` block rows of `R` x `C` blocks; `row` appends those of one to the list it is given,
     /// each with its column: below `own_columns` one of this rank, from there on one of `ghosts`.
+    /// `blocks`: how many there are in all.
     ///
     /// # Panics
     /// If blocks of this size have no kernel: 2x2, 2x3 and multiples of 3 have.
@@ -37,10 +38,11 @@ impl BlockProduct {
         rows: usize,
         own_columns: usize,
         ghosts: Vec<i32>,
+        blocks: usize,
         mut row: impl FnMut(usize, &mut Vec<(usize, [[f64; C]; R])>),
     ) -> Self {
-        let new = || Blocks::growing([R, C]).expect("blocks with a kernel");
-        let (mut own, mut other) = (new(), new());
+        let new = |blocks| Blocks::growing([R, C], blocks).expect("blocks with a kernel");
+        let (mut own, mut other) = (new(blocks), new(0));
         let (mut inside, mut outside) = (Vec::new(), Vec::new());
         for k in 0..rows {
             inside.clear();

@@ -33,6 +33,15 @@ const BEYOND: usize = 1;
 const AHEAD: usize = 8192;
 
 impl Shape {
+    /// Values of a block.
+    fn values(self) -> usize {
+        match self {
+            Shape::Two => 4,
+            Shape::Three => 9,
+            Shape::TwoByThree => 6,
+        }
+    }
+
     fn of(size: [usize; 2]) -> Option<Self> {
         match size {
             [2, 2] => Some(Shape::Two),
@@ -87,7 +96,8 @@ impl Blocks {
     }
 
     /// No rows yet, in blocks of `size`: 2x2, 2x3, or multiples of 3, which are kept as 3x3.
-    pub fn growing(size: [usize; 2]) -> Option<Growing> {
+    /// `blocks`: about how many there will be.
+    pub fn growing(size: [usize; 2], blocks: usize) -> Option<Growing> {
         let shape = match size {
             [r, c] if r % 3 == 0 && c % 3 == 0 && r * c > 0 => Shape::Three,
             _ => Shape::of(size)?,
@@ -96,8 +106,8 @@ impl Blocks {
             shape,
             rows: None,
             offsets: vec![0],
-            columns: Vec::new(),
-            values: Vec::new(),
+            columns: Vec::with_capacity(blocks * size[0] * size[1] / shape.values()),
+            values: Vec::with_capacity(blocks * size[0] * size[1] + BEYOND),
         };
         Some(Growing { blocks, filled: Vec::new(), count: 0 })
     }
@@ -231,24 +241,30 @@ pub struct Growing {
 impl Growing {
     /// Appends a row of `R` x `C` blocks, each with its column.
     pub fn push<const R: usize, const C: usize>(&mut self, row: &[(usize, [[f64; C]; R])]) {
-        let (tall, wide) = match self.blocks.shape {
-            Shape::Two => (2, 2),
-            Shape::Three => (3, 3),
-            Shape::TwoByThree => (2, 3),
-        };
-        for first in (0..R).step_by(tall) {
+        match self.blocks.shape {
+            Shape::Two => self.push_in::<R, C, 2, 2, 4>(row),
+            Shape::Three => self.push_in::<R, C, 3, 3, 9>(row),
+            Shape::TwoByThree => self.push_in::<R, C, 2, 3, 6>(row),
+        }
+    }
+
+    /// In kernel blocks of `T` x `W`, `N` values.
+    #[inline(always)]
+    fn push_in<const R: usize, const C: usize, const T: usize, const W: usize, const N: usize>(
+        &mut self,
+        row: &[(usize, [[f64; C]; R])],
+    ) {
+        for first in (0..R).step_by(T) {
             for (column, block) in row {
-                for left in (0..C).step_by(wide) {
-                    self.blocks.columns.push((column * (C / wide) + left / wide) as u32);
-                    let lines = &block[first..first + tall];
-                    if self.blocks.shape == Shape::Two {
-                        let values = lines.iter().flat_map(|line| &line[left..left + wide]);
-                        self.blocks.values.extend(values.map(|&value| value as f32));
-                    } else {
-                        let columns = left..left + wide;
-                        let values = columns.flat_map(|c| lines.iter().map(move |line| line[c]));
-                        self.blocks.values.extend(values.map(|value| value as f32));
+                for left in (0..C).step_by(W) {
+                    self.blocks.columns.push((column * (C / W) + left / W) as u32);
+                    let mut values = [0.0; N];
+                    for r in 0..T {
+                        for c in 0..W {
+                            values[place::<T, W>(r, c)] = block[first + r][left + c] as f32;
+                        }
                     }
+                    self.blocks.values.extend_from_slice(&values);
                 }
             }
             if !row.is_empty() {
@@ -262,7 +278,6 @@ impl Growing {
     pub fn finish(self) -> Blocks {
         let Growing { mut blocks, filled, count } = self;
         blocks.values.extend([0.0; BEYOND]);
-        blocks.values.shrink_to_fit();
         blocks.rows = (filled.len() < count as usize).then_some(filled);
         blocks
     }

@@ -44,7 +44,7 @@ pub struct CoarsestRows {
 
 /// Chebyshev's smoother takes care of the eigenvalues between these shares of the largest, as
 /// PETSc's own multigrid has it.
-const SMOOTHED: [f64; 2] = [0.1, 1.1];
+const SMOOTHED: [f64; 2] = [0.05, 1.1];
 
 /// Whether the solver's preconditioner is a cycle on given levels.
 pub(super) fn wanted(ksp: sys::KSP) -> Result<bool> {
@@ -69,8 +69,11 @@ pub(super) fn install(
     petsc!(PCMGSetLevels(pc, count + 1, null_mut()))?;
     for (level, smoothed) in (1..=count).rev().zip(levels) {
         let Smoothed { product, inverse, largest, transfer } = smoothed;
-        let mut smoother = null_mut();
+        let (mut smoother, mut inner) = (null_mut(), null_mut());
         petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
+        petsc!(KSPSetType(smoother, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
+        petsc!(KSPGetPC(smoother, &mut inner))?;
+        petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?;
         let diagonal = inverse.iter().map(|&v| if v > 0.0 { 1.0 / v } else { 0.0 }).collect();
         let matrix = Shell::new(comm, product, diagonal)?;
         petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;

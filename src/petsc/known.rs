@@ -36,8 +36,6 @@ const READ_LATER: [&str; 8] = [
     "snes_converged",
     "snes_monitor",
 ];
-/// Our own, of multigrid's levels.
-const OWN: &str = "mg_levels_single";
 /// Beginnings of unprefixed names that belong to no solver, or are read at PETSc's end.
 const GENERAL: [&str; 18] = [
     "log",
@@ -168,7 +166,7 @@ fn judge(name: &str, value: &str) -> Result<Answer> {
         return Ok(if begins(&GENERAL, name) { Answer::Known } else { Answer::Unknown });
     };
     let base = without_nesting(own);
-    if own == OWN || begins(&READ_LATER, base) { Ok(Answer::Known) } else { ask(base, value) }
+    if begins(&READ_LATER, base) { Ok(Answer::Known) } else { ask(base, value) }
 }
 
 /// `mg_levels_1_pc_type` is `pc_type` of a solver inside.

@@ -7,7 +7,7 @@ use mpi::traits::{AsRaw, Communicator};
 
 use super::check::{bool_of, c_text, petsc, require_running, running, text_of};
 use super::vector::index;
-use super::{Matrix, Vector, smoother, sys};
+use super::{Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
 /// Owner of a PETSc `KSP`.
@@ -131,12 +131,7 @@ impl Ksp {
         outcome(self.raw)
     }
 
-    /// Levels of multigrid that are smoothed with a matrix in single precision.
-    pub fn levels_in_single(&self) -> Result<usize> {
-        smoother::count(self.raw)
-    }
-
-    /// Method and preconditioner in use, for the report: for example "cg + gamg".
+    /// Method and preconditioner in use, for the report: for example "cg + mg".
     pub fn describe(&self) -> Result<String> {
         describe(self.raw)
     }

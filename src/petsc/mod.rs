@@ -10,8 +10,9 @@
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks in single precision |
-//! | `product.rs` | such a matrix in the place of PETSc's own |
-//! | `smoother.rs` | multigrid's cycle on such matrices |
+//! | `block_product.rs` | [`BlockProduct`]: a rank's rows of such a matrix, and PETSc's shell over them |
+//! | `hierarchy.rs` | [`Hierarchy`]: multigrid's cycle on levels of such matrices |
+//! | `object.rs` | handles given back when they go out of scope |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
 //! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
 //! | `forcing.rs` | [`Forcing`]: how well each linear solve of Newton's method is worth doing |
@@ -31,9 +32,7 @@ pub mod log;
 pub mod matrix;
 pub mod options;
 mod object;
-mod product;
 pub mod session;
-mod smoother;
 pub mod snes;
 pub mod sys;
 pub mod vector;

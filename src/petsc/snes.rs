@@ -16,7 +16,7 @@ use super::forcing::{self, Forcing};
 use super::ksp;
 use super::vector::{Values, ValuesMut, index};
 use super::hierarchy::{self, Hierarchy};
-use super::{Ksp, Matrix, Vector, smoother, sys};
+use super::{Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
 /// The problem's judgement of an iterate.
@@ -92,17 +92,12 @@ pub struct Snes {
     forcing: Option<Forcing>,
 }
 
-/// Number of linear solves per preconditioner from which on it is one for all.
-const KEPT: sys::PetscInt = 1000;
-
 /// What the callbacks see during one solve.
 struct Context<'a, P> {
     problem: &'a mut P,
     matrix: &'a mut Matrix,
     comm: &'a SimpleCommunicator,
     forcing: Option<Forcing>,
-    /// One preconditioner serves the whole solve.
-    kept: bool,
     /// State of the matrix that multigrid's levels were made for.
     levels: Option<sys::PetscObjectState>,
     error: Option<Error>,
@@ -184,14 +179,11 @@ impl Snes {
         }
         self.matrix = matrix.id();
         let raw_matrix = matrix.raw();
-        let mut lag = 0;
-        petsc!(SNESGetLagPreconditioner(self.raw, &mut lag))?;
         let mut context = Context {
             problem,
             matrix,
             comm: &self.comm,
             forcing: self.forcing.clone(),
-            kept: lag == -1 || lag >= KEPT,
             levels: None,
             error: None,
             diverged: None,
@@ -358,7 +350,6 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
         unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
     context.settle(result, |context, ()| {
         context.renew_levels(inner)?;
-        smoother::compact(inner, context.comm, context.kept)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, f64::from(sys::PETSC_DEFAULT));
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;

@@ -31,8 +31,7 @@ pub const SECTIONS: &[Section] = &[
             key("output", Table("output"), Optional("all defaults"), "What is written, and when."),
             key("parallel", Table("parallel"), Optional("all defaults"), "Distribution."),
             key("petsc", Special("a table of strings, numbers or true"), Optional("none"),
-                "PETSc options by name without the dash; `true` is a bare flag. One more: \
-                 `qs_mg_levels_single = false` keeps multigrid's smoothers in double precision."),
+                "PETSc options by name without the dash; `true` is a bare flag."),
             key("conditioning", Table("conditioning"),
                 Optional("needed by type = \"conditioning\""), "Rigid motion of the study."),
         ],
