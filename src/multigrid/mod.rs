@@ -42,7 +42,7 @@ const COARSEST: usize = 600;
 const LEAST_GAIN: f64 = 0.8;
 const MOST_LEVELS: usize = 12;
 /// Couplings below this share are weak.
-const THRESHOLD: f64 = 0.04;
+const THRESHOLD: f64 = 0.03;
 /// Of the prolongator's smoothing, over the largest eigenvalue.
 const DAMPING: f64 = 1.5;
 

@@ -44,7 +44,7 @@ pub struct CoarsestRows {
 
 /// Chebyshev's smoother takes care of the eigenvalues between these shares of the largest, as
 /// PETSc's own multigrid has it.
-const SMOOTHED: [f64; 2] = [0.05, 1.1];
+const SMOOTHED: [f64; 2] = [0.1, 1.1];
 
 /// Whether the solver's preconditioner is a cycle on given levels.
 pub(super) fn wanted(ksp: sys::KSP) -> Result<bool> {
