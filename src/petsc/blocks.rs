@@ -60,30 +60,9 @@ impl Blocks {
     /// of whole blocks.
     pub fn of_pattern(size: [usize; 2], offsets: &[i32], columns: &[i32]) -> Option<Self> {
         let shape = Shape::of(size)?;
-        let [tall, wide] = size;
-        let count = offsets.len().saturating_sub(1);
-        if !count.is_multiple_of(tall) {
-            return None;
-        }
-        let row = |r: usize| columns.get(offsets[r] as usize..offsets[r + 1] as usize);
-        let mut rows = Vec::new();
-        let (mut starts, mut blocks) = (vec![0], Vec::new());
-        for first in (0..count).step_by(tall) {
-            let pattern = row(first)?;
-            for run in pattern.chunks(wide) {
-                blocks.push(block_of(run, wide)? as u32);
-            }
-            if (1..tall).any(|k| row(first + k) != Some(pattern)) {
-                return None;
-            }
-            if !pattern.is_empty() {
-                rows.push((first / tall) as u32);
-                starts.push(u32::try_from(blocks.len()).ok()?);
-            }
-        }
-        let values = vec![0.0; blocks.len() * tall * wide + BEYOND];
-        let rows = (rows.len() < count / tall).then_some(rows);
-        Some(Blocks { shape, rows, offsets: starts, columns: blocks, values })
+        let Pattern { rows, offsets, columns } = pattern_of(size, offsets, columns)?;
+        let values = vec![0.0; columns.len() * size[0] * size[1] + BEYOND];
+        Some(Blocks { shape, rows, offsets, columns, values })
     }
 
     /// Rounds the `values` of the compressed rows of [`Self::of_pattern`], the same `offsets`.
@@ -151,7 +130,7 @@ impl Blocks {
             let values = self.values[blocks.start * R * C..].chunks_exact(R * C);
             let mut sums = [0.0; R];
             for (&column, block) in self.columns[blocks].iter().zip(values) {
-                fetch(block, AHEAD);
+                fetch(block.as_ptr(), AHEAD);
                 let x = &x[column as usize];
                 for c in 0..C {
                     for (r, sum) in sums.iter_mut().enumerate() {
@@ -187,7 +166,7 @@ impl Blocks {
             let values = self.values[blocks.start * R * C..].chunks_exact(R * C);
             let x = &x[self.row(k)];
             for (&column, block) in self.columns[blocks].iter().zip(values) {
-                fetch(block, AHEAD);
+                fetch(block.as_ptr(), AHEAD);
                 let y = &mut y[column as usize];
                 for (c, y) in y.iter_mut().enumerate() {
                     for (r, &x) in x.iter().enumerate() {
@@ -203,6 +182,47 @@ impl Blocks {
     fn row(&self, k: usize) -> usize {
         self.rows.as_ref().map_or(k, |rows| rows[k] as usize)
     }
+}
+
+/// Which blocks there are, as in [`Blocks`].
+pub(super) struct Pattern {
+    pub rows: Option<Vec<u32>>,
+    pub offsets: Vec<u32>,
+    pub columns: Vec<u32>,
+}
+
+impl Pattern {
+    /// The block row behind the k-th one with entries.
+    pub fn row(&self, k: usize) -> usize {
+        self.rows.as_ref().map_or(k, |rows| rows[k] as usize)
+    }
+}
+
+/// Compressed rows as blocks of `size` rows and columns; `None` where they are not.
+pub(super) fn pattern_of(size: [usize; 2], offsets: &[i32], columns: &[i32]) -> Option<Pattern> {
+    let [tall, wide] = size;
+    let count = offsets.len().saturating_sub(1);
+    if !count.is_multiple_of(tall) {
+        return None;
+    }
+    let row = |r: usize| columns.get(offsets[r] as usize..offsets[r + 1] as usize);
+    let mut rows = Vec::new();
+    let (mut starts, mut blocks) = (vec![0], Vec::new());
+    for first in (0..count).step_by(tall) {
+        let pattern = row(first)?;
+        for run in pattern.chunks(wide) {
+            blocks.push(block_of(run, wide)? as u32);
+        }
+        if (1..tall).any(|k| row(first + k) != Some(pattern)) {
+            return None;
+        }
+        if !pattern.is_empty() {
+            rows.push((first / tall) as u32);
+            starts.push(u32::try_from(blocks.len()).ok()?);
+        }
+    }
+    let rows = (rows.len() < count / tall).then_some(rows);
+    Some(Pattern { rows, offsets: starts, columns: blocks })
 }
 
 /// The block that `columns` are: `wide` in a row, from a multiple of it.
@@ -229,18 +249,18 @@ fn store<const R: usize, const ADD: bool>(target: &mut [f64; R], sums: [f64; R])
 
 /// a b + c, rounded once where the instruction set can.
 #[inline(always)]
-fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+pub(super) fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// Asks for what lies `ahead` bytes further on.
 #[inline(always)]
-fn fetch<T>(here: &[T], ahead: usize) {
+pub(super) fn fetch<T>(here: *const T, ahead: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
         // SAFETY: a hint that reads nothing, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(here.as_ptr().cast::<i8>().wrapping_add(ahead)) };
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(here.cast::<i8>().wrapping_add(ahead)) };
     }
     #[cfg(not(target_arch = "x86_64"))]
     let _ = (here, ahead);
@@ -279,12 +299,12 @@ mod avx2 {
         for (k, range) in blocks.offsets.windows(2).enumerate() {
             let row = range[0] as usize..range[1] as usize;
             let (columns, values) = (&blocks.columns[row.clone()], &values[row]);
-            fetch(columns, AHEAD / 4);
+            fetch(columns.as_ptr(), AHEAD / 4);
             let (columns, last_column) = columns.as_chunks::<2>();
             let (values, last) = values.as_chunks::<2>();
             let mut sums = [_mm256_setzero_pd(); 2];
             for (columns, values) in columns.iter().zip(values) {
-                fetch(values, AHEAD);
+                fetch(values.as_ptr(), AHEAD);
                 sums[0] = term(columns[0], &values[0], sums[0]);
                 sums[1] = term(columns[1], &values[1], sums[1]);
             }
@@ -307,10 +327,10 @@ mod avx2 {
             let row = range[0] as usize..range[1] as usize;
             let values = &blocks.values[row.start * 9..row.end * 9 + BEYOND];
             let columns = &blocks.columns[row];
-            fetch(columns, AHEAD / 9);
+            fetch(columns.as_ptr(), AHEAD / 9);
             let mut sums = [_mm256_setzero_pd(); 3];
             for (&column, block) in columns.iter().zip(values.windows(9 + BEYOND).step_by(9)) {
-                fetch(block, AHEAD);
+                fetch(block.as_ptr(), AHEAD);
                 let x = &x[column as usize];
                 for c in 0..3 {
                     // SAFETY: ten values are there. The fourth lane belongs to the next column and

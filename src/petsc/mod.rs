@@ -10,6 +10,7 @@
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks in single precision |
+//! | `half.rs` | [`Half`]: the same of a symmetric matrix, one of each two mirrored blocks kept |
 //! | `product.rs` | such a matrix in the place of PETSc's own |
 //! | `smoother.rs` | multigrid's cycle on such matrices |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
@@ -23,6 +24,7 @@
 mod blocks;
 mod check;
 mod forcing;
+mod half;
 pub mod known;
 pub mod ksp;
 pub mod log;
@@ -38,6 +40,7 @@ pub mod vector;
 pub use blocks::Blocks;
 pub use check::agree;
 pub use forcing::Forcing;
+pub use half::Half;
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
 pub use session::{Session, abort_all, version};

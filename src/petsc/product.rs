@@ -7,8 +7,9 @@ use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, CommunicatorCollectives};
 
-use super::blocks::{Blocks, block_of};
+use super::blocks::block_of;
 use super::check::{check, keep, petsc, running};
+use super::half::Copied;
 use super::sys;
 use super::vector::{Values, ValuesMut, index};
 use crate::error::Result;
@@ -82,7 +83,7 @@ struct Product {
 /// A sequential matrix in compressed rows, part of the matrix, and its copy.
 struct Part {
     source: sys::Mat,
-    blocks: Blocks,
+    blocks: Copied,
 }
 
 /// What other ranks' unknowns contribute.
@@ -102,7 +103,7 @@ impl Product {
         petsc!(MatGetBlockSizes(matrix, &mut tall, &mut wide))?;
         // Blocks of 6 are four of 3.
         let size = [tall, wide].map(|size| if size % 3 == 0 { 3 } else { size.max(0) as usize });
-        let own = Part::of(own, size)?;
+        let own = Part::of(own, size, is_symmetric(matrix)?)?;
         let halo = if other.is_null() { None } else { Some(ghost_blocks(other, map, size)?) };
         let mine = own.is_some() && !matches!(halo, Some(None));
         let mut everywhere = false;
@@ -180,10 +181,11 @@ impl Product {
 }
 
 impl Part {
-    fn of(source: sys::Mat, size: [usize; 2]) -> Result<Option<Self>> {
+    fn of(source: sys::Mat, size: [usize; 2], symmetric: bool) -> Result<Option<Self>> {
         let rows = Rows::of(source)?;
         let (offsets, columns) = rows.pattern();
-        Ok(Blocks::of_pattern(size, offsets, columns).map(|blocks| Part { source, blocks }))
+        let blocks = Copied::of_pattern(size, offsets, columns, symmetric);
+        Ok(blocks.map(|blocks| Part { source, blocks }))
     }
 
     fn renew(&mut self) -> Result<()> {
@@ -198,6 +200,13 @@ impl Part {
         }
         petsc!(MatSeqAIJRestoreArrayRead(self.source, &mut values))
     }
+}
+
+/// Whether A = A^T has been told to PETSc, of a coarse level by PETSc.
+fn is_symmetric(matrix: sys::Mat) -> Result<bool> {
+    let (mut known, mut symmetric) = (sys::PETSC_FALSE, sys::PETSC_FALSE);
+    petsc!(MatIsSymmetricKnown(matrix, &mut known, &mut symmetric))?;
+    Ok(known != sys::PETSC_FALSE && symmetric != sys::PETSC_FALSE)
 }
 
 /// The part of other ranks' unknowns and which global blocks those are; `None` where they do not
@@ -219,7 +228,7 @@ fn ghost_blocks(
     let blocks: Option<Vec<_>> =
         map.chunks(wide).map(|run| block_of(run, wide).map(|k| k as sys::PetscInt)).collect();
     let Some(blocks) = blocks else { return Ok(None) };
-    Ok(Part::of(other, size)?.map(|part| (part, blocks)))
+    Ok(Part::of(other, size, false)?.map(|part| (part, blocks)))
 }
 
 impl Halo {
