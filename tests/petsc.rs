@@ -6,7 +6,9 @@ use common::{on_ranks, on_ranks_with};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::error::{Error, Result};
-use mpm_par::petsc::{self, Blocks, Ksp, Matrix, NewtonProblem, Session, Snes, Vector, Verdict};
+use mpm_par::petsc::{
+    self, Blocks, Half, Ksp, Matrix, NewtonProblem, Session, Snes, Vector, Verdict,
+};
 
 /// This rank's rows of a system of `n` rows in blocks of `block`; rank 1 gets none.
 fn share(comm: &SimpleCommunicator, n: usize, block: usize) -> std::ops::Range<usize> {
@@ -573,6 +575,149 @@ fn oblong_blocks_multiply_both_ways() {
     close(&product, &y);
     blocks.multiply_transposed(&up, &mut transposed);
     close(&transposed, &z);
+}
+
+/// Compressed rows of a symmetric pattern of blocks: `pairs` of block rows, mirrored.
+fn mirrored(block: usize, rows: usize, pairs: &[(usize, usize)]) -> (Vec<i32>, Vec<i32>) {
+    let (mut offsets, mut columns) = (vec![0], Vec::new());
+    for row in 0..rows {
+        let other = |&(i, j): &(usize, usize)| {
+            if i == row { Some(j) } else { (j == row).then_some(i) }
+        };
+        let blocks: std::collections::BTreeSet<usize> = pairs.iter().filter_map(other).collect();
+        for _ in 0..block {
+            columns.extend(
+                blocks.iter().flat_map(|&j| (block * j..block * (j + 1)).map(|c| c as i32)),
+            );
+            offsets.push(columns.len() as i32);
+        }
+    }
+    (offsets, columns)
+}
+
+/// Values of the mirrored entries that differ by rounding, as sums in another order do.
+fn nearly_symmetric(offsets: &[i32], columns: &[i32]) -> Vec<f64> {
+    let mut values = Vec::new();
+    for (row, range) in offsets.windows(2).enumerate() {
+        for &column in &columns[range[0] as usize..range[1] as usize] {
+            let (low, high) = (row.min(column as usize), row.max(column as usize));
+            let noise = if low == row { 1.0 + 1e-14 } else { 1.0 };
+            values.push(noise * (1.7 * low as f64 + 0.3 * (high * high) as f64).sin());
+        }
+    }
+    values
+}
+
+/// A x with the values in single precision, of each mirrored pair the lower; and sum |A x|.
+fn lower_product(offsets: &[i32], columns: &[i32], values: &[f64], x: &[f64]) -> Vec<(f64, f64)> {
+    let mut sums = vec![(0.0, 0.0); x.len()];
+    let mut add = |row: usize, term: f64| {
+        sums[row].0 += term;
+        sums[row].1 += term.abs();
+    };
+    for (row, range) in offsets.windows(2).enumerate() {
+        for k in range[0] as usize..range[1] as usize {
+            let (column, value) = (columns[k] as usize, f64::from(values[k] as f32));
+            if column <= row {
+                add(row, value * x[column]);
+            }
+            if column < row {
+                add(column, value * x[row]);
+            }
+        }
+    }
+    sums
+}
+
+#[test]
+fn half_of_a_symmetric_matrix_multiplies_like_the_whole() {
+    // Lattices of neighbours, arrow, rows without entries, without a diagonal block, none at all.
+    let line = |n: usize, reach: usize| -> Vec<(usize, usize)> {
+        (0..n).flat_map(|i| (i..n.min(i + reach + 1)).map(move |j| (i, j))).collect()
+    };
+    let mut state = 7u64;
+    let mut random = |below: usize| {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 33) as usize % below
+    };
+    let mut patterns = vec![
+        (40, line(40, 3)),
+        (9, (0..9).map(|i| (i, 8)).chain((0..9).map(|i| (i, i))).collect()),
+        (6, vec![(1, 1), (4, 1), (4, 4)]),
+        (5, vec![(0, 3), (3, 4)]),
+        (1, vec![(0, 0)]),
+        (3, Vec::new()),
+        (0, Vec::new()),
+    ];
+    for _ in 0..40 {
+        let rows = 1 + random(30);
+        let count = random(4 * rows);
+        patterns.push((rows, (0..count).map(|_| (random(rows), random(rows))).collect()));
+    }
+    for block in [2, 3] {
+        for (rows, pairs) in &patterns {
+            let (offsets, columns) = mirrored(block, *rows, pairs);
+            let values = nearly_symmetric(&offsets, &columns);
+            let mut half = Half::of_pattern(block, &offsets, &columns).unwrap();
+            half.fill(&offsets, &values);
+            let n = block * rows;
+            let x: Vec<f64> = (0..n).map(|k| (k as f64 * 1.3).cos()).collect();
+            let (mut fast, mut plain, mut sum) = (vec![f64::NAN; n], vec![f64::NAN; n], x.clone());
+            half.multiply(&x, &mut fast);
+            half.multiply_plain(&x, &mut plain);
+            half.multiply_add(&x, &mut sum);
+            for (r, (exact, size)) in
+                lower_product(&offsets, &columns, &values, &x).into_iter().enumerate()
+            {
+                let tolerance = 1e-15 * (size + 1e-3);
+                assert!((fast[r] - exact).abs() < tolerance, "{block}, {r}: {} {exact}", fast[r]);
+                assert!((plain[r] - exact).abs() < tolerance, "{block}, {r}: {} {exact}", plain[r]);
+                assert!((sum[r] - x[r] - exact).abs() < tolerance + 1e-15, "{block}, {r}");
+            }
+            // The whole, where mirrored values may round apart.
+            let mut blocks = Blocks::of_pattern([block; 2], &offsets, &columns).unwrap();
+            blocks.fill(&offsets, &values);
+            let mut whole = vec![0.0; n];
+            blocks.multiply(&x, &mut whole);
+            assert!(whole.iter().zip(&fast).all(|(a, b)| (a - b).abs() < 1e-5), "{rows} {pairs:?}");
+        }
+        // x^T A y = y^T A x to the rounding of the sums, whatever was given above the diagonal.
+        let (offsets, columns) = mirrored(block, 40, &line(40, 5));
+        let values: Vec<f64> = (0..columns.len()).map(|k| (k as f64 * 0.7).sin()).collect();
+        let mut half = Half::of_pattern(block, &offsets, &columns).unwrap();
+        half.fill(&offsets, &values);
+        let n = 40 * block;
+        let x: Vec<f64> = (0..n).map(|k| (k as f64 * 1.3).cos()).collect();
+        let y: Vec<f64> = (0..n).map(|k| (k as f64 * 0.4).sin()).collect();
+        let (mut ax, mut ay) = (vec![0.0; n], vec![0.0; n]);
+        half.multiply(&x, &mut ax);
+        half.multiply_transposed(&y, &mut ay);
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        assert!((dot(&y, &ax) - dot(&x, &ay)).abs() < 1e-12);
+    }
+}
+
+#[test]
+fn half_needs_a_pattern_that_is_its_own_mirror_image() {
+    for block in [2, 3] {
+        let rows = |pattern: &[&[i32]]| {
+            let (mut offsets, mut columns) = (vec![0], Vec::new());
+            let b = block as i32;
+            for row in pattern {
+                for _ in 0..block {
+                    columns.extend(row.iter().flat_map(|&j| b * j..b * (j + 1)));
+                    offsets.push(columns.len() as i32);
+                }
+            }
+            Half::of_pattern(block, &offsets, &columns).is_some()
+        };
+        assert!(rows(&[&[0, 1], &[0, 1, 2], &[1]]));
+        assert!(!rows(&[&[0, 1], &[1, 2], &[1]]), "above the diagonal alone");
+        assert!(!rows(&[&[0], &[0, 1], &[2]]), "below it alone");
+        assert!(!rows(&[&[0, 1], &[1], &[0, 2]]), "another one below");
+        assert!(!rows(&[&[0, 3], &[1], &[2]]), "beyond the rows");
+    }
+    assert!(Half::of_pattern(1, &[0, 1], &[0]).is_none());
 }
 
 /// x^3 + A x = 1 with [`membrane`]'s A.

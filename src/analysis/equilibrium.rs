@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::grid::Grid;
 use crate::multigrid::{self, Assembled};
 use crate::parallel::World;
-use crate::petsc::Hierarchy;
+use crate::petsc::{BlockProduct, Hierarchy};
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::{NewtonProblem, Verdict};
 use crate::points::Points;
@@ -422,6 +422,14 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         let other = other.as_deref().unwrap_or(&[]);
         let rows = Assembled::new(self.numbering, self.pattern, &own, other);
         multigrid::of_system(self.world, self.grid, self.numbering, &rows)
+    }
+
+    fn fill(&mut self, matrix: &mut Matrix, exact: &mut BlockProduct<f64>) -> Result<()> {
+        let (own, other) = matrix.storage()?;
+        let other = other.as_deref().unwrap_or(&[]);
+        let rows = Assembled::new(self.numbering, self.pattern, &own, other);
+        multigrid::fill::<_, D>(&rows, exact);
+        Ok(())
     }
 }
 

@@ -29,7 +29,7 @@ use crate::assembly::Numbering;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
-use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed};
+use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed, Stored};
 
 use aggregate::Aggregates;
 use galerkin::Coarse;
@@ -85,19 +85,24 @@ pub fn build<const K: usize, const C: usize>(
     nodes: &Nodes,
     rows: &impl Rows<K>,
 ) -> Result<Option<Hierarchy>> {
+    let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
+    let mut exact = BlockProduct::symmetric::<K>(nodes.owned, ghosts.clone(), count);
+    fill(rows, &mut exact);
+    let mut rounded = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count);
+    exact.round_into(&mut rounded);
     let mut levels = Vec::new();
-    let Some((level, mut coarse, mut length)) = coarsen::<K, C>(world, nodes, rows, 1.0, 1.0, 2)?
-    else {
-        return Ok(None);
-    };
+    let first = coarsen::<K, C>(world, nodes, rows, rounded, 1.0, 1.0, 2)?;
+    let Some((level, mut coarse, mut length)) = first else { return Ok(None) };
     levels.push(level);
     while levels.len() < MOST_LEVELS && world.sum_usize(coarse.nodes.owned) * C > COARSEST {
-        let next = coarsen::<C, C>(world, &coarse.nodes, &coarse.rows, length, LEAST_GAIN, 1)?;
+        let (nodes, rows) = (&coarse.nodes, &coarse.rows);
+        let product = product(nodes, rows);
+        let next = coarsen::<C, C>(world, nodes, rows, product, length, LEAST_GAIN, 1)?;
         let Some((level, coarser, coarser_length)) = next else { break };
         levels.push(level);
         (coarse, length) = (coarser, coarser_length);
     }
-    Ok(Some(Hierarchy { levels, coarsest: coarsest(&coarse) }))
+    Ok(Some(Hierarchy { exact, levels, coarsest: coarsest(&coarse) }))
 }
 
 /// One level, the next, and the latter's length of rotations (m). `None` where the next has more than
@@ -106,6 +111,7 @@ fn coarsen<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,
     rows: &impl Rows<K>,
+    product: BlockProduct<f32>,
     length: f64,
     gain: f64,
     distance: usize,
@@ -116,7 +122,6 @@ fn coarsen<const K: usize, const C: usize>(
     if aggregates.total == 0 || aggregates.total as f64 > gain * all as f64 {
         return Ok(None);
     }
-    let product = product(nodes, rows);
     let mut inverse = vec![0.0; nodes.owned * K];
     for row in 0..nodes.owned {
         rows.visit(row, |column, block| {
@@ -140,12 +145,23 @@ fn coarsen<const K: usize, const C: usize>(
 }
 
 /// A level's matrix for the cycle.
-fn product<const K: usize>(nodes: &Nodes, rows: &impl Rows<K>) -> BlockProduct {
+fn product<const K: usize>(nodes: &Nodes, rows: &impl Rows<K>) -> BlockProduct<f32> {
     let ghosts = nodes.global[nodes.owned..].to_vec();
-    let blocks = (0..nodes.owned).map(|row| rows.columns(row).len()).sum();
-    BlockProduct::collect::<K, K>(nodes.owned, nodes.owned, ghosts, blocks, |row, blocks| {
+    let mut product = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count(nodes, rows));
+    fill(rows, &mut product);
+    product
+}
+
+/// Blocks in the owned rows.
+fn count<const K: usize>(nodes: &Nodes, rows: &impl Rows<K>) -> usize {
+    (0..nodes.owned).map(|row| rows.columns(row).len()).sum()
+}
+
+/// The values of `rows` into a product with them.
+pub fn fill<T: Stored, const K: usize>(rows: &impl Rows<K>, product: &mut BlockProduct<T>) {
+    product.fill::<K>(|row, blocks| {
         rows.visit(row, |column, block| blocks.push((column, *block)));
-    })
+    });
 }
 
 /// The transfer for the cycle: the owned rows, by local coarse nodes.
@@ -153,7 +169,7 @@ fn transfer<const K: usize, const C: usize>(
     fine: &Nodes,
     prolongator: &Prolongator<K, C>,
     coarse: &Nodes,
-) -> BlockProduct {
+) -> BlockProduct<f32> {
     let first = coarse.first();
     let ghosts = &coarse.global[coarse.owned..];
     let count = prolongator.offsets[fine.owned];

@@ -16,7 +16,7 @@ const STEPS: usize = 10;
 pub fn largest<const K: usize>(
     world: &World,
     nodes: &Nodes,
-    product: &BlockProduct,
+    product: &BlockProduct<f32>,
     inverse: &[f64],
 ) -> Result<f64> {
     let owned = nodes.owned * K;

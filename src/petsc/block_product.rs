@@ -1,7 +1,8 @@
-//! y = A x and y = A^T x by the rows of one rank in blocks of single precision, with the columns of
-//! other ranks apart: values to keep, and the PETSc matrix that multiplies with them.
+//! y = A x and y = A^T x by the rows of one rank in blocks, with the columns of other ranks apart:
+//! values to keep, and the PETSc matrix that multiplies with them.
 
 use std::ffi::c_void;
+use std::marker::PhantomData;
 use std::ptr::null_mut;
 
 use mpi::topology::SimpleCommunicator;
@@ -9,16 +10,18 @@ use mpi::traits::AsRaw;
 
 use super::blocks::Blocks;
 use super::check::{keep, petsc};
+use super::half::Half;
 use super::object::Object;
+use super::stored::Stored;
 use super::sys;
 use super::vector::{Values, ValuesMut, index};
 use crate::error::{Error, Result};
 
-/// The rows of one rank.
+/// The rows of one rank, their values kept as `T`.
 #[derive(Debug, Clone)]
-pub struct BlockProduct {
-    own: Blocks,
-    other: Blocks,
+pub struct BlockProduct<T> {
+    own: Own<T>,
+    other: Blocks<T>,
     /// Global block column of each column of `other`.
     ghosts: Vec<i32>,
     /// Scalar rows, and columns of this rank.
@@ -27,9 +30,19 @@ pub struct BlockProduct {
     wide: usize,
 }
 
-impl BlockProduct {
-    /// `rows` block rows of `R` x `C` blocks; `row` appends those of one to the list it is given,
-    /// each with its column: below `own_columns` one of this rank, from there on one of `ghosts`.
+/// What multiplies this rank's unknowns.
+#[derive(Debug, Clone)]
+enum Own<T> {
+    Whole(Blocks<T>),
+    Symmetric(Half<T>),
+}
+
+/// Blocks of one row, each with its column: below the number of own ones one of this rank, from
+/// there on one of the ghosts.
+pub type Row<const R: usize, const C: usize> = Vec<(usize, [[f64; C]; R])>;
+
+impl<T: Stored> BlockProduct<T> {
+    /// `rows` block rows of `R` x `C` blocks; `row` appends those of one to the list it is given.
     /// `blocks`: how many there are in all.
     ///
     /// # Panics
@@ -39,27 +52,20 @@ impl BlockProduct {
         own_columns: usize,
         ghosts: Vec<i32>,
         blocks: usize,
-        mut row: impl FnMut(usize, &mut Vec<(usize, [[f64; C]; R])>),
+        mut row: impl FnMut(usize, &mut Row<R, C>),
     ) -> Self {
         let new = |blocks| Blocks::growing([R, C], blocks).expect("blocks with a kernel");
         let (mut own, mut other) = (new(blocks), new(0));
         let (mut inside, mut outside) = (Vec::new(), Vec::new());
         for k in 0..rows {
-            inside.clear();
-            outside.clear();
             row(k, &mut inside);
-            inside.retain(|&(column, block)| {
-                let here = column < own_columns;
-                if !here {
-                    outside.push((column - own_columns, block));
-                }
-                here
-            });
+            split(&mut inside, &mut outside, own_columns);
             own.push(&inside);
             other.push(&outside);
+            inside.clear();
         }
         BlockProduct {
-            own: own.finish(),
+            own: Own::Whole(own.finish()),
             other: other.finish(),
             ghosts,
             size: [rows * R, own_columns * C],
@@ -67,22 +73,98 @@ impl BlockProduct {
         }
     }
 
+    /// A symmetric matrix of `rows` block rows with `K` unknowns each: room for the `blocks` of
+    /// [`Self::fill`].
+    ///
+    /// # Panics
+    /// As [`Self::collect`].
+    pub fn symmetric<const K: usize>(rows: usize, ghosts: Vec<i32>, blocks: usize) -> Self {
+        let own = Half::growing(K, (blocks + rows) / 2).expect("blocks with a kernel");
+        let other = Blocks::growing([K, K], 0).expect("blocks with a kernel").finish();
+        let size = [rows * K; 2];
+        BlockProduct { own: Own::Symmetric(own), other, ghosts, size, wide: K }
+    }
+
+    /// The values of a symmetric matrix, as in [`Self::collect`]; again when they have changed.
+    pub fn fill<const K: usize>(&mut self, mut row: impl FnMut(usize, &mut Row<K, K>)) {
+        let Own::Symmetric(half) = &mut self.own else { return };
+        half.clear();
+        let mut other = Blocks::growing([K, K], 0).expect("blocks with a kernel");
+        let (mut inside, mut outside) = (Vec::new(), Vec::new());
+        let rows = self.size[0] / K;
+        for k in 0..rows {
+            row(k, &mut inside);
+            split(&mut inside, &mut outside, rows);
+            half.push(&inside);
+            other.push(&outside);
+            inside.clear();
+        }
+        self.other = other.finish();
+    }
+
     /// y = A x with the ghosts' values behind the own ones in `x`.
     pub fn multiply_local(&self, x: &[f64], y: &mut [f64]) {
         let (own, ghosts) = x.split_at(self.size[1]);
-        self.own.multiply(own, y);
+        self.multiply_own(own, y);
         if !self.ghosts.is_empty() {
             self.other.multiply_add(ghosts, y);
         }
     }
+
+    fn multiply_own(&self, x: &[f64], y: &mut [f64]) {
+        match &self.own {
+            Own::Whole(blocks) => blocks.multiply(x, y),
+            Own::Symmetric(half) => half.multiply(x, y),
+        }
+    }
+
+    fn multiply_own_add(&self, x: &[f64], y: &mut [f64]) {
+        match &self.own {
+            Own::Whole(blocks) => blocks.multiply_add(x, y),
+            Own::Symmetric(half) => half.multiply_add(x, y),
+        }
+    }
+
+    fn multiply_own_transposed(&self, x: &[f64], y: &mut [f64]) {
+        match &self.own {
+            Own::Whole(blocks) => blocks.multiply_transposed(x, y),
+            Own::Symmetric(half) => half.multiply(x, y),
+        }
+    }
+}
+
+impl BlockProduct<f64> {
+    /// The same in single precision, in the place of what `target` held.
+    pub fn round_into(&self, target: &mut BlockProduct<f32>) {
+        if let (Own::Symmetric(own), Own::Symmetric(target)) = (&self.own, &mut target.own) {
+            own.round_into(target);
+        }
+        target.other = self.other.rounded();
+    }
+}
+
+/// Moves the blocks in columns of other ranks to `outside`.
+fn split<const R: usize, const C: usize>(
+    inside: &mut Row<R, C>,
+    outside: &mut Row<R, C>,
+    own_columns: usize,
+) {
+    outside.clear();
+    inside.retain(|&(column, block)| {
+        let here = column < own_columns;
+        if !here {
+            outside.push((column - own_columns, block));
+        }
+        here
+    });
 }
 
 /// One reference to a PETSc shell matrix over a [`BlockProduct`].
-pub(super) struct Shell(Object<sys::Mat>);
+pub(super) struct Shell<T>(Object<sys::Mat>, PhantomData<T>);
 
 /// What the shell multiplies by.
-struct Context {
-    product: BlockProduct,
+struct Context<T> {
+    product: BlockProduct<T>,
     diagonal: Vec<f64>,
     ghosts: Option<Ghosts>,
 }
@@ -93,11 +175,11 @@ struct Ghosts {
     values: Object<sys::Vec>,
 }
 
-impl Shell {
+impl<T: Stored> Shell<T> {
     /// `diagonal`: of a square matrix, else empty. Collective.
     pub(super) fn new(
         comm: &SimpleCommunicator,
-        product: BlockProduct,
+        product: BlockProduct<T>,
         diagonal: Vec<f64>,
     ) -> Result<Self> {
         let [rows, columns] = [index(product.size[0])?, index(product.size[1])?];
@@ -108,15 +190,15 @@ impl Shell {
         petsc!(MatCreateShell(
             comm.as_raw(), rows, columns, all, all, data.cast::<c_void>(), &mut shell.0
         ))?;
-        petsc!(MatShellSetContextDestroy(shell.0, Some(destroy)))?;
+        petsc!(MatShellSetContextDestroy(shell.0, Some(destroy::<T>)))?;
         // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls each, by its
         // place among the operations, as what it is.
         let (once, add, twice, diagonal) = unsafe {
             (
-                std::mem::transmute::<Apply, unsafe extern "C" fn()>(multiply),
-                std::mem::transmute::<Sum, unsafe extern "C" fn()>(multiply_add),
-                std::mem::transmute::<Apply, unsafe extern "C" fn()>(transposed),
-                std::mem::transmute::<Get, unsafe extern "C" fn()>(get_diagonal),
+                std::mem::transmute::<Apply, unsafe extern "C" fn()>(multiply::<T>),
+                std::mem::transmute::<Sum, unsafe extern "C" fn()>(multiply_add::<T>),
+                std::mem::transmute::<Apply, unsafe extern "C" fn()>(transposed::<T>),
+                std::mem::transmute::<Get, unsafe extern "C" fn()>(get_diagonal::<T>),
             )
         };
         petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT, Some(once)))?;
@@ -132,16 +214,28 @@ impl Shell {
             let context = unsafe { &mut *data };
             context.ghosts = Some(Ghosts::new(shell.0, &context.product)?);
         }
-        Ok(Shell(shell))
+        Ok(Shell(shell, PhantomData))
     }
 
     pub(super) fn raw(&self) -> sys::Mat {
         self.0.0
     }
+
+    /// Gives the values a new content.
+    pub(super) fn change(
+        &mut self,
+        act: impl FnOnce(&mut BlockProduct<T>) -> Result<()>,
+    ) -> Result<()> {
+        let mut data: *mut c_void = null_mut();
+        petsc!(MatShellGetContext(self.raw(), (&raw mut data).cast()))?;
+        // SAFETY: the box that `new` gave up lives as long as the shell, and PETSc is not
+        // multiplying while this runs.
+        act(unsafe { &mut (*data.cast::<Context<T>>()).product })
+    }
 }
 
 impl Ghosts {
-    fn new(shell: sys::Mat, product: &BlockProduct) -> Result<Self> {
+    fn new<T>(shell: sys::Mat, product: &BlockProduct<T>) -> Result<Self> {
         let (mut wanted, mut own) = (Object(null_mut()), Object(null_mut()));
         let (mut values, mut scatter) = (Object(null_mut()), Object(null_mut()));
         // SAFETY: a constant of a running MPI.
@@ -158,7 +252,7 @@ impl Ghosts {
     }
 }
 
-impl Context {
+impl<T: Stored> Context<T> {
     /// y = A x, or y += A x; the ghosts' values travel while the own part is multiplied.
     fn multiply(&self, x: sys::Vec, y: sys::Vec, add: bool) -> Result<()> {
         let (insert, forward) = (sys::INSERT_VALUES, sys::SCATTER_FORWARD);
@@ -169,9 +263,9 @@ impl Context {
             // SAFETY: PETSc's vectors live through the call and are distinct, as `MatMult` asks.
             let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
             if add {
-                self.product.own.multiply_add(&x, &mut y);
+                self.product.multiply_own_add(&x, &mut y);
             } else {
-                self.product.own.multiply(&x, &mut y);
+                self.product.multiply_own(&x, &mut y);
             }
         }
         if let Some(ghosts) = &self.ghosts {
@@ -189,7 +283,7 @@ impl Context {
         {
             // SAFETY: as in `multiply`.
             let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
-            self.product.own.multiply_transposed(&x, &mut y);
+            self.product.multiply_own_transposed(&x, &mut y);
             if let Some(ghosts) = &self.ghosts {
                 // SAFETY: as in `multiply`.
                 let mut values = unsafe { ValuesMut::of(ghosts.values.0)? };
@@ -210,18 +304,22 @@ type Get = unsafe extern "C" fn(sys::Mat, sys::Vec) -> sys::PetscErrorCode;
 
 // A panic cannot pass the C code below these functions: `extern "C"` turns it into an abort.
 
-unsafe extern "C" fn multiply(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
-    with_context(shell, |context| context.multiply(x, y, false))
+unsafe extern "C" fn multiply<T: Stored>(
+    shell: sys::Mat,
+    x: sys::Vec,
+    y: sys::Vec,
+) -> sys::PetscErrorCode {
+    with_context::<T>(shell, |context| context.multiply(x, y, false))
 }
 
 /// z = y + A x, where z may be y.
-unsafe extern "C" fn multiply_add(
+unsafe extern "C" fn multiply_add<T: Stored>(
     shell: sys::Mat,
     x: sys::Vec,
     y: sys::Vec,
     z: sys::Vec,
 ) -> sys::PetscErrorCode {
-    with_context(shell, |context| {
+    with_context::<T>(shell, |context| {
         if y != z {
             petsc!(VecCopy(y, z))?;
         }
@@ -229,12 +327,19 @@ unsafe extern "C" fn multiply_add(
     })
 }
 
-unsafe extern "C" fn transposed(shell: sys::Mat, x: sys::Vec, y: sys::Vec) -> sys::PetscErrorCode {
-    with_context(shell, |context| context.multiply_transposed(x, y))
+unsafe extern "C" fn transposed<T: Stored>(
+    shell: sys::Mat,
+    x: sys::Vec,
+    y: sys::Vec,
+) -> sys::PetscErrorCode {
+    with_context::<T>(shell, |context| context.multiply_transposed(x, y))
 }
 
-unsafe extern "C" fn get_diagonal(shell: sys::Mat, diagonal: sys::Vec) -> sys::PetscErrorCode {
-    with_context(shell, |context| {
+unsafe extern "C" fn get_diagonal<T: Stored>(
+    shell: sys::Mat,
+    diagonal: sys::Vec,
+) -> sys::PetscErrorCode {
+    with_context::<T>(shell, |context| {
         // SAFETY: PETSc's vector lives through the call.
         let mut values = unsafe { ValuesMut::of(diagonal)? };
         if values.len() != context.diagonal.len() {
@@ -246,20 +351,20 @@ unsafe extern "C" fn get_diagonal(shell: sys::Mat, diagonal: sys::Vec) -> sys::P
 }
 
 /// Acts on the context of a shell of ours.
-fn with_context(
+fn with_context<T>(
     shell: sys::Mat,
-    act: impl FnOnce(&Context) -> Result<()>,
+    act: impl FnOnce(&Context<T>) -> Result<()>,
 ) -> sys::PetscErrorCode {
     let mut data: *mut c_void = null_mut();
     let outcome = petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
         // SAFETY: the box that `Shell::new` gave up lives as long as the shell.
-        act(unsafe { &*data.cast::<Context>() })
+        act(unsafe { &*data.cast::<Context<T>>() })
     });
     outcome.map_or_else(|error| keep(&error), |()| 0)
 }
 
-unsafe extern "C" fn destroy(data: *mut c_void) -> sys::PetscErrorCode {
+unsafe extern "C" fn destroy<T>(data: *mut c_void) -> sys::PetscErrorCode {
     // SAFETY: the box that `Shell::new` gave up, and PETSc calls this once.
-    drop(unsafe { Box::from_raw(data.cast::<Context>()) });
+    drop(unsafe { Box::from_raw(data.cast::<Context<T>>()) });
     0
 }

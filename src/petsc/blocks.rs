@@ -1,10 +1,12 @@
-//! y = A x for a sparse A of small blocks, its values rounded to single precision: 4 bytes an
-//! entry and 4 a block, where compressed rows take 12 an entry. Sums are in double precision.
-//! For multigrid's cycle, which has to be fixed and symmetric, not exact.
+//! y = A x for a sparse A of small blocks with one column index each, the values in single or in
+//! double precision: 4 or 8 bytes an entry and 4 a block, where compressed rows take 12 an entry. Sums
+//! are in double precision. Of a symmetric matrix [`super::Half`] takes half of that.
+
+use super::stored::{AHEAD, BEYOND, Stored, fetch, multiply_add};
 
 /// The rows of one rank, or the part of them that multiplies other ranks' unknowns.
 #[derive(Debug, Clone)]
-pub struct Blocks {
+pub struct Blocks<T> {
     shape: Shape,
     /// Block rows with entries, where some have none.
     rows: Option<Vec<u32>>,
@@ -13,7 +15,7 @@ pub struct Blocks {
     /// Block column of each block.
     columns: Vec<u32>,
     /// Squares of 2 by rows, others by columns; then one value that is loaded and never used.
-    values: Vec<f32>,
+    values: Vec<T>,
 }
 
 /// Rows and columns of a block.
@@ -24,13 +26,6 @@ enum Shape {
     /// 2 rows, 3 columns: from rigid-body modes of the plane to displacements.
     TwoByThree,
 }
-
-/// Loaded in fours, the last column of the last block reads one value beyond it.
-const BEYOND: usize = 1;
-
-/// Bytes of values between what is used and what is asked for: the rows are too short for the
-/// processor to foresee the next ones.
-const AHEAD: usize = 8192;
 
 impl Shape {
     /// Values of a block.
@@ -63,41 +58,10 @@ macro_rules! by_shape {
     };
 }
 
-impl Blocks {
-    /// The pattern of compressed rows (`offsets` of each scalar row, ascending `columns`) in blocks
-    /// of `size` rows and columns, 2x2, 3x3 or 2x3, with values zero; `None` where it is not made
-    /// of whole blocks.
-    pub fn of_pattern(size: [usize; 2], offsets: &[i32], columns: &[i32]) -> Option<Self> {
-        let shape = Shape::of(size)?;
-        let [tall, wide] = size;
-        let count = offsets.len().saturating_sub(1);
-        if !count.is_multiple_of(tall) {
-            return None;
-        }
-        let row = |r: usize| columns.get(offsets[r] as usize..offsets[r + 1] as usize);
-        let mut rows = Vec::new();
-        let (mut starts, mut blocks) = (vec![0], Vec::new());
-        for first in (0..count).step_by(tall) {
-            let pattern = row(first)?;
-            for run in pattern.chunks(wide) {
-                blocks.push(block_of(run, wide)? as u32);
-            }
-            if (1..tall).any(|k| row(first + k) != Some(pattern)) {
-                return None;
-            }
-            if !pattern.is_empty() {
-                rows.push((first / tall) as u32);
-                starts.push(u32::try_from(blocks.len()).ok()?);
-            }
-        }
-        let values = vec![0.0; blocks.len() * tall * wide + BEYOND];
-        let rows = (rows.len() < count / tall).then_some(rows);
-        Some(Blocks { shape, rows, offsets: starts, columns: blocks, values })
-    }
-
+impl<T: Stored> Blocks<T> {
     /// No rows yet, in blocks of `size`: 2x2, 2x3, or multiples of 3, which are kept as 3x3.
     /// `blocks`: about how many there will be.
-    pub fn growing(size: [usize; 2], blocks: usize) -> Option<Growing> {
+    pub fn growing(size: [usize; 2], blocks: usize) -> Option<Growing<T>> {
         let shape = match size {
             [r, c] if r % 3 == 0 && c % 3 == 0 && r * c > 0 => Shape::Three,
             _ => Shape::of(size)?,
@@ -110,29 +74,6 @@ impl Blocks {
             values: Vec::with_capacity(blocks * size[0] * size[1] + BEYOND),
         };
         Some(Growing { blocks, filled: Vec::new(), count: 0 })
-    }
-
-    /// Rounds the `values` of the compressed rows of [`Self::of_pattern`], the same `offsets`.
-    pub fn fill(&mut self, offsets: &[i32], values: &[f64]) {
-        by_shape!(self, fill_of[](offsets, values));
-    }
-
-    fn fill_of<const R: usize, const C: usize>(&mut self, offsets: &[i32], values: &[f64]) {
-        for (k, range) in self.offsets.windows(2).enumerate() {
-            let row = self.rows.as_ref().map_or(k, |rows| rows[k] as usize);
-            let (first, end) = (range[0] as usize * R * C, range[1] as usize * R * C);
-            let width = (end - first) / R;
-            for r in 0..R {
-                let start = offsets[row * R + r] as usize;
-                let source = values[start..start + width].chunks_exact(C);
-                let target = self.values[first..end].chunks_exact_mut(R * C);
-                for (target, source) in target.zip(source) {
-                    for (c, &value) in source.iter().enumerate() {
-                        target[place::<R, C>(r, c)] = value as f32;
-                    }
-                }
-            }
-        }
     }
 
     /// y = A x. Rows without entries are set to zero.
@@ -153,7 +94,7 @@ impl Blocks {
         #[cfg(target_arch = "x86_64")]
         if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
             // SAFETY: the processor has just said that it knows the instructions.
-            return unsafe { avx2::run::<ADD>(self, x, y) };
+            return unsafe { avx2::run::<T, ADD>(self, x, y) };
         }
         by_shape!(self, plain[ADD, false](x, y));
     }
@@ -177,7 +118,7 @@ impl Blocks {
             let values = self.values[blocks.start * R * C..].chunks_exact(R * C);
             let mut sums = [0.0; R];
             for (&column, block) in self.columns[blocks].iter().zip(values) {
-                fetch(block, AHEAD);
+                fetch(block.as_ptr(), AHEAD);
                 let x = &x[column as usize];
                 for c in 0..C {
                     for (r, sum) in sums.iter_mut().enumerate() {
@@ -213,7 +154,7 @@ impl Blocks {
             let values = self.values[blocks.start * R * C..].chunks_exact(R * C);
             let x = &x[self.row(k)];
             for (&column, block) in self.columns[blocks].iter().zip(values) {
-                fetch(block, AHEAD);
+                fetch(block.as_ptr(), AHEAD);
                 let y = &mut y[column as usize];
                 for (c, y) in y.iter_mut().enumerate() {
                     for (r, &x) in x.iter().enumerate() {
@@ -231,14 +172,27 @@ impl Blocks {
     }
 }
 
+impl Blocks<f64> {
+    /// The same in single precision.
+    pub fn rounded(&self) -> Blocks<f32> {
+        Blocks {
+            shape: self.shape,
+            rows: self.rows.clone(),
+            offsets: self.offsets.clone(),
+            columns: self.columns.clone(),
+            values: self.values.iter().map(|&value| value as f32).collect(),
+        }
+    }
+}
+
 /// [`Blocks`] that are given row by row.
-pub struct Growing {
-    blocks: Blocks,
+pub struct Growing<T> {
+    blocks: Blocks<T>,
     filled: Vec<u32>,
     count: u32,
 }
 
-impl Growing {
+impl<T: Stored> Growing<T> {
     /// Appends a row of `R` x `C` blocks, each with its column.
     pub fn push<const R: usize, const C: usize>(&mut self, row: &[(usize, [[f64; C]; R])]) {
         match self.blocks.shape {
@@ -248,20 +202,20 @@ impl Growing {
         }
     }
 
-    /// In kernel blocks of `T` x `W`, `N` values.
+    /// In kernel blocks of `H` x `W`, `N` values.
     #[inline(always)]
-    fn push_in<const R: usize, const C: usize, const T: usize, const W: usize, const N: usize>(
+    fn push_in<const R: usize, const C: usize, const H: usize, const W: usize, const N: usize>(
         &mut self,
         row: &[(usize, [[f64; C]; R])],
     ) {
-        for first in (0..R).step_by(T) {
+        for first in (0..R).step_by(H) {
             for (column, block) in row {
                 for left in (0..C).step_by(W) {
                     self.blocks.columns.push((column * (C / W) + left / W) as u32);
-                    let mut values = [0.0; N];
-                    for r in 0..T {
+                    let mut values = [T::default(); N];
+                    for r in 0..H {
                         for c in 0..W {
-                            values[place::<T, W>(r, c)] = block[first + r][left + c] as f32;
+                            values[place::<H, W>(r, c)] = T::rounded(block[first + r][left + c]);
                         }
                     }
                     self.blocks.values.extend_from_slice(&values);
@@ -275,21 +229,12 @@ impl Growing {
         }
     }
 
-    pub fn finish(self) -> Blocks {
+    pub fn finish(self) -> Blocks<T> {
         let Growing { mut blocks, filled, count } = self;
-        blocks.values.extend([0.0; BEYOND]);
+        blocks.values.extend([T::default(); BEYOND]);
         blocks.rows = (filled.len() < count as usize).then_some(filled);
         blocks
     }
-}
-
-/// The block that `columns` are: `wide` in a row, from a multiple of it.
-pub fn block_of(columns: &[i32], wide: usize) -> Option<usize> {
-    let start = usize::try_from(*columns.first()?).ok()?;
-    let whole = columns.len() == wide
-        && start.is_multiple_of(wide)
-        && columns.iter().zip(start..).all(|(&column, expected)| column as usize == expected);
-    whole.then_some(start / wide)
 }
 
 /// Where a block keeps its entry (r, c).
@@ -305,64 +250,46 @@ fn store<const R: usize, const ADD: bool>(target: &mut [f64; R], sums: [f64; R])
     }
 }
 
-/// a b + c, rounded once where the instruction set can.
-#[inline(always)]
-fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
-}
-
-/// Asks for what lies `ahead` bytes further on.
-#[inline(always)]
-fn fetch<T>(here: &[T], ahead: usize) {
-    #[cfg(target_arch = "x86_64")]
-    {
-        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-        // SAFETY: a hint that reads nothing, whatever the address.
-        unsafe { _mm_prefetch::<_MM_HINT_T0>(here.as_ptr().cast::<i8>().wrapping_add(ahead)) };
-    }
-    #[cfg(not(target_arch = "x86_64"))]
-    let _ = (here, ahead);
-}
-
 /// With AVX2 and fused multiply-add: a square of 2, or a column of a square of 3, in one vector.
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
-    use super::{AHEAD, BEYOND, Blocks, Shape, fetch, store};
+    use super::{AHEAD, BEYOND, Blocks, Shape, Stored, fetch, store};
+    use crate::petsc::stored::load;
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn run<const ADD: bool>(blocks: &Blocks, x: &[f64], y: &mut [f64]) {
+    pub fn run<T: Stored, const ADD: bool>(blocks: &Blocks<T>, x: &[f64], y: &mut [f64]) {
         match blocks.shape {
-            Shape::Two => twos::<ADD>(blocks, x, y),
-            Shape::Three => threes::<ADD>(blocks, x, y),
+            Shape::Two => twos::<T, ADD>(blocks, x, y),
+            Shape::Three => threes::<T, ADD>(blocks, x, y),
             Shape::TwoByThree => blocks.plain::<2, 3, ADD, true>(x, y),
         }
     }
 
     #[target_feature(enable = "avx2,fma")]
-    pub fn transposed(blocks: &Blocks, x: &[f64], y: &mut [f64]) {
+    pub fn transposed<T: Stored>(blocks: &Blocks<T>, x: &[f64], y: &mut [f64]) {
         by_shape!(blocks, transposed[true](x, y));
     }
 
     #[target_feature(enable = "avx2,fma")]
-    fn twos<const ADD: bool>(blocks: &Blocks, x: &[f64], y: &mut [f64]) {
+    fn twos<T: Stored, const ADD: bool>(blocks: &Blocks<T>, x: &[f64], y: &mut [f64]) {
         let (x, y) = (x.as_chunks::<2>().0, y.as_chunks_mut::<2>().0);
         let values = blocks.values.as_chunks::<4>().0;
-        let term = |column: u32, block: &[f32; 4], sum: __m256d| {
+        let term = |column: u32, block: &[T; 4], sum: __m256d| {
             let x = &x[column as usize];
             // SAFETY: four values are there, and two.
-            let (block, x) = unsafe { (_mm_loadu_ps(block.as_ptr()), _mm_loadu_pd(x.as_ptr())) };
-            _mm256_fmadd_pd(_mm256_cvtps_pd(block), _mm256_set_m128d(x, x), sum)
+            let (block, x) = unsafe { (load(block.as_ptr()), _mm_loadu_pd(x.as_ptr())) };
+            _mm256_fmadd_pd(block, _mm256_set_m128d(x, x), sum)
         };
         for (k, range) in blocks.offsets.windows(2).enumerate() {
             let row = range[0] as usize..range[1] as usize;
             let (columns, values) = (&blocks.columns[row.clone()], &values[row]);
-            fetch(columns, AHEAD / 4);
+            fetch(columns.as_ptr(), AHEAD / 4);
             let (columns, last_column) = columns.as_chunks::<2>();
             let (values, last) = values.as_chunks::<2>();
             let mut sums = [_mm256_setzero_pd(); 2];
             for (columns, values) in columns.iter().zip(values) {
-                fetch(values, AHEAD);
+                fetch(values.as_ptr(), AHEAD);
                 sums[0] = term(columns[0], &values[0], sums[0]);
                 sums[1] = term(columns[1], &values[1], sums[1]);
             }
@@ -379,22 +306,21 @@ mod avx2 {
     }
 
     #[target_feature(enable = "avx2,fma")]
-    fn threes<const ADD: bool>(blocks: &Blocks, x: &[f64], y: &mut [f64]) {
+    fn threes<T: Stored, const ADD: bool>(blocks: &Blocks<T>, x: &[f64], y: &mut [f64]) {
         let (x, y) = (x.as_chunks::<3>().0, y.as_chunks_mut::<3>().0);
         for (k, range) in blocks.offsets.windows(2).enumerate() {
             let row = range[0] as usize..range[1] as usize;
             let values = &blocks.values[row.start * 9..row.end * 9 + BEYOND];
             let columns = &blocks.columns[row];
-            fetch(columns, AHEAD / 9);
+            fetch(columns.as_ptr(), AHEAD / 9);
             let mut sums = [_mm256_setzero_pd(); 3];
             for (&column, block) in columns.iter().zip(values.windows(9 + BEYOND).step_by(9)) {
-                fetch(block, AHEAD);
+                fetch(block.as_ptr(), AHEAD);
                 let x = &x[column as usize];
                 for c in 0..3 {
                     // SAFETY: ten values are there. The fourth lane belongs to the next column and
                     // is dropped below.
-                    let column = unsafe { _mm_loadu_ps(block.as_ptr().add(3 * c)) };
-                    let column = _mm256_cvtps_pd(column);
+                    let column = unsafe { load(block.as_ptr().add(3 * c)) };
                     sums[c] = _mm256_fmadd_pd(column, _mm256_set1_pd(x[c]), sums[c]);
                 }
             }

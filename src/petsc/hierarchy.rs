@@ -13,10 +13,12 @@ use super::block_product::{BlockProduct, Shell};
 use super::check::petsc;
 use super::matrix::Matrix;
 use super::sys;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Levels from the finest to the last but one, and the last.
 pub struct Hierarchy {
+    /// The matrix itself: symmetric, and like that of the finest level but for the rounding.
+    pub exact: BlockProduct<f64>,
     pub levels: Vec<Smoothed>,
     pub coarsest: CoarsestRows,
 }
@@ -24,13 +26,13 @@ pub struct Hierarchy {
 /// A level with a smoother.
 pub struct Smoothed {
     /// Its matrix A.
-    pub product: BlockProduct,
+    pub product: BlockProduct<f32>,
     /// One over the diagonal of the owned rows, zero where that is not positive.
     pub inverse: Vec<f64>,
     /// Largest eigenvalue of D^-1 A.
     pub largest: f64,
     /// P, from the next level to this one.
-    pub transfer: BlockProduct,
+    pub transfer: BlockProduct<f32>,
 }
 
 /// This rank's rows of the last level, compressed: global columns, ascending.
@@ -54,39 +56,106 @@ pub(super) fn wanted(ksp: sys::KSP) -> Result<bool> {
     Ok(same != sys::PETSC_FALSE)
 }
 
-/// Puts the levels under a solver with operators; whatever it had goes. Collective.
-pub(super) fn install(
-    ksp: sys::KSP,
-    comm: &SimpleCommunicator,
-    hierarchy: Hierarchy,
-) -> Result<()> {
-    let Hierarchy { levels, coarsest } = hierarchy;
-    let count = levels.len() as sys::PetscInt;
-    let mut pc = null_mut();
-    petsc!(KSPGetPC(ksp, &mut pc))?;
-    petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
-    petsc!(PCSetType(pc, sys::PCMG.as_ptr().cast()))?;
-    petsc!(PCMGSetLevels(pc, count + 1, null_mut()))?;
-    for (level, smoothed) in (1..=count).rev().zip(levels) {
-        let Smoothed { product, inverse, largest, transfer } = smoothed;
-        let (mut smoother, mut inner) = (null_mut(), null_mut());
-        petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
-        petsc!(KSPSetType(smoother, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
-        petsc!(KSPGetPC(smoother, &mut inner))?;
-        petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?;
-        let diagonal = inverse.iter().map(|&v| if v > 0.0 { 1.0 / v } else { 0.0 }).collect();
-        let matrix = Shell::new(comm, product, diagonal)?;
-        petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
-        let [low, high] = SMOOTHED.map(|share| share * largest);
-        petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
-        let transfer = Shell::new(comm, transfer, Vec::new())?;
-        petsc!(PCMGSetInterpolation(pc, level, transfer.raw()))?;
-        petsc!(PCMGSetRestriction(pc, level, transfer.raw()))?;
+/// A hierarchy in use.
+pub(super) struct Installed {
+    /// States of the matrix that the levels were made for, and that the products hold.
+    made: sys::PetscObjectState,
+    filled: sys::PetscObjectState,
+    exact: Shell<f64>,
+    finest: Shell<f32>,
+}
+
+impl Installed {
+    /// Puts the levels under a solver with operators; whatever it had goes. Collective.
+    pub fn new(
+        ksp: sys::KSP,
+        comm: &SimpleCommunicator,
+        state: sys::PetscObjectState,
+        hierarchy: Hierarchy,
+    ) -> Result<Self> {
+        let Hierarchy { exact, levels, coarsest } = hierarchy;
+        let count = levels.len() as sys::PetscInt;
+        let mut pc = null_mut();
+        petsc!(KSPGetPC(ksp, &mut pc))?;
+        petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
+        petsc!(PCSetType(pc, sys::PCMG.as_ptr().cast()))?;
+        petsc!(PCMGSetLevels(pc, count + 1, null_mut()))?;
+        let mut finest = None;
+        for (level, smoothed) in (1..=count).rev().zip(levels) {
+            let matrix = put_level(pc, comm, level, smoothed)?;
+            finest.get_or_insert(matrix);
+        }
+        put_coarsest(pc, comm, coarsest)?;
+        petsc!(PCSetFromOptions(pc))?;
+        let none = || Error::Environment("a hierarchy without levels".into());
+        Ok(Installed {
+            made: state,
+            filled: state,
+            exact: Shell::new(comm, exact, Vec::new())?,
+            finest: finest.ok_or_else(none)?,
+        })
     }
-    let CoarsestRows { block, offsets, columns, values } = coarsest;
+
+    /// Whether the levels belong to other values of the matrix than those of `state`.
+    pub fn outdated(&self, state: sys::PetscObjectState) -> bool {
+        self.made != state
+    }
+
+    /// Lets `fill` write the values of `state` where the finest matrix is multiplied by, if they
+    /// are not there yet; the other levels stay.
+    pub fn follow(
+        &mut self,
+        state: sys::PetscObjectState,
+        fill: impl FnOnce(&mut BlockProduct<f64>) -> Result<()>,
+    ) -> Result<()> {
+        if self.filled == state {
+            return Ok(());
+        }
+        self.filled = state;
+        let finest = &mut self.finest;
+        self.exact.change(|exact| {
+            fill(exact)?;
+            finest.change(|rounded| {
+                exact.round_into(rounded);
+                Ok(())
+            })
+        })
+    }
+
+    /// Makes the solver's iteration multiply by the exact copy. `matrix` is what it stands for.
+    pub fn multiply_by_copy(&self, ksp: sys::KSP, matrix: sys::Mat) -> Result<()> {
+        petsc!(KSPSetOperators(ksp, self.exact.raw(), matrix))
+    }
+}
+
+/// Smoother, residual and transfer of a level; its matrix.
+fn put_level(
+    pc: sys::PC,
+    comm: &SimpleCommunicator,
+    level: sys::PetscInt,
+    smoothed: Smoothed,
+) -> Result<Shell<f32>> {
+    let Smoothed { product, inverse, largest, transfer } = smoothed;
+    let (mut smoother, mut inner) = (null_mut(), null_mut());
+    petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
+    petsc!(KSPSetType(smoother, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
+    petsc!(KSPGetPC(smoother, &mut inner))?;
+    petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?;
+    let diagonal = inverse.iter().map(|&v| if v > 0.0 { 1.0 / v } else { 0.0 }).collect();
+    let matrix = Shell::new(comm, product, diagonal)?;
+    petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
+    let [low, high] = SMOOTHED.map(|share| share * largest);
+    petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
+    let transfer = Shell::new(comm, transfer, Vec::new())?;
+    petsc!(PCMGSetInterpolation(pc, level, transfer.raw()))?;
+    petsc!(PCMGSetRestriction(pc, level, transfer.raw()))?;
+    Ok(matrix)
+}
+
+fn put_coarsest(pc: sys::PC, comm: &SimpleCommunicator, rows: CoarsestRows) -> Result<()> {
+    let CoarsestRows { block, offsets, columns, values } = rows;
     let matrix = Matrix::from_csr(comm, block, offsets.len() - 1, &offsets, &columns, &values)?;
     let mut coarse = null_mut();
     petsc!(PCMGGetCoarseSolve(pc, &mut coarse))?;
-    petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))?;
-    petsc!(PCSetFromOptions(pc))
+    petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))
 }

@@ -9,7 +9,9 @@
 //! | `known.rs` | options no solver knows, told before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
-//! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks in single precision |
+//! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks |
+//! | `half.rs` | [`Half`]: the lower half of a symmetric one |
+//! | `stored.rs` | [`Stored`]: single or double precision |
 //! | `block_product.rs` | [`BlockProduct`]: a rank's rows of such a matrix, and PETSc's shell over them |
 //! | `hierarchy.rs` | [`Hierarchy`]: multigrid's cycle on levels of such matrices |
 //! | `object.rs` | handles given back when they go out of scope |
@@ -25,6 +27,7 @@ mod block_product;
 mod blocks;
 mod check;
 mod forcing;
+mod half;
 mod hierarchy;
 pub mod known;
 pub mod ksp;
@@ -34,6 +37,7 @@ pub mod options;
 mod object;
 pub mod session;
 pub mod snes;
+mod stored;
 pub mod sys;
 pub mod vector;
 
@@ -41,9 +45,11 @@ pub use block_product::BlockProduct;
 pub use blocks::Blocks;
 pub use check::agree;
 pub use forcing::Forcing;
+pub use half::Half;
 pub use hierarchy::{CoarsestRows, Hierarchy, Smoothed};
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
 pub use session::{Session, abort_all, version};
+pub use stored::Stored;
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
 pub use vector::Vector;

@@ -15,8 +15,8 @@ use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
 use super::ksp;
 use super::vector::{Values, ValuesMut, index};
-use super::hierarchy::{self, Hierarchy};
-use super::{Ksp, Matrix, Vector, sys};
+use super::hierarchy::{self, Hierarchy, Installed};
+use super::{BlockProduct, Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
 /// The problem's judgement of an iterate.
@@ -58,10 +58,15 @@ pub trait NewtonProblem {
         f64::INFINITY
     }
 
-    /// Levels for a preconditioner of type `mg`, for the values that the matrix has. `None`: there
-    /// are none for it.
+    /// Levels for a preconditioner of type `mg`, for the values that the matrix has; it is
+    /// symmetric. `None`: there are none for it.
     fn hierarchy(&mut self, _matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         Ok(None)
+    }
+
+    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact.
+    fn fill(&mut self, _matrix: &mut Matrix, _exact: &mut BlockProduct<f64>) -> Result<()> {
+        Ok(())
     }
 }
 
@@ -98,8 +103,8 @@ struct Context<'a, P> {
     matrix: &'a mut Matrix,
     comm: &'a SimpleCommunicator,
     forcing: Option<Forcing>,
-    /// State of the matrix that multigrid's levels were made for.
-    levels: Option<sys::PetscObjectState>,
+    /// Multigrid's, where it is the preconditioner.
+    levels: Option<Installed>,
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
@@ -272,24 +277,26 @@ impl<P: NewtonProblem> Context<'_, P> {
         }
     }
 
-    /// Makes multigrid's levels for the matrix as it is, unless those there are shall serve on.
+    /// Makes multigrid's levels for the matrix as it is, or where those there are shall serve on,
+    /// renews what the finest multiplies by.
     fn renew_levels(&mut self, inner: sys::KSP) -> Result<()> {
+        if !hierarchy::wanted(inner)? {
+            return Ok(());
+        }
         let (mut kept, mut state) = (sys::PETSC_FALSE, 0);
         petsc!(KSPGetReusePreconditioner(inner, &mut kept))?;
         petsc!(PetscObjectStateGet(self.matrix.raw().cast(), &mut state))?;
-        let due = match self.levels {
-            None => true,
-            Some(made) => kept == sys::PETSC_FALSE && made != state,
-        };
-        if !due || !hierarchy::wanted(inner)? {
-            return Ok(());
+        let serves = |levels: &Installed| kept != sys::PETSC_FALSE || !levels.outdated(state);
+        if !self.levels.as_ref().is_some_and(serves) {
+            let made = self.problem.hierarchy(self.matrix);
+            let made = agree(self.comm, made)?;
+            let install = |made| Installed::new(inner, self.comm, state, made);
+            self.levels = made.map(install).transpose()?;
         }
-        let made = self.problem.hierarchy(self.matrix);
-        if let Some(made) = agree(self.comm, made)? {
-            hierarchy::install(inner, self.comm, made)?;
-        }
-        self.levels = Some(state);
-        Ok(())
+        let Some(levels) = &mut self.levels else { return Ok(()) };
+        let (problem, matrix) = (&mut *self.problem, &mut *self.matrix);
+        levels.follow(state, |exact| problem.fill(matrix, exact))?;
+        levels.multiply_by_copy(inner, self.matrix.raw())
     }
 
     /// Largest of the ranks' numbers.

@@ -4,12 +4,12 @@
 //! they say little; the load is printed beside them.
 
 mod limits;
+mod products;
 mod report;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use mpm_par::petsc::Blocks;
 use report::machine;
 
 /// Runs of each kind; pairs alternate one and two ranks.
@@ -24,7 +24,7 @@ fn main() {
         println!("triad, GB/s by wall time: one core {one:.1}, two together {two:.1}");
     }
     if wanted("products") {
-        products();
+        products::products();
     }
     if wanted("beam") {
         beam();
@@ -102,76 +102,6 @@ fn median(mut values: Vec<f64>) -> f64 {
 fn load() -> String {
     std::fs::read_to_string("/proc/loadavg")
         .map_or_else(|_| "unknown".into(), |text| text[..text.len().min(14)].to_string())
-}
-
-/// One product with the matrix of a square and of a cube, every node coupled to those around it:
-/// compressed rows in double precision, row by row, and blocks in single precision.
-fn products() {
-    println!(
-        "\n| matrix | entries | rows, ms | GB/s | blocks, ms | GB/s | plain, ms | rounding, ms |"
-    );
-    println!("|---|---|---|---|---|---|---|---|");
-    for (name, block, side) in [("2D", 2, [252, 252, 1]), ("3D", 3, [32, 32, 32])] {
-        let (offsets, columns) = neighbours(block, side);
-        let values: Vec<f64> = (0..columns.len()).map(|k| (k % 101) as f64 - 50.0).collect();
-        let x: Vec<f64> = (1..offsets.len()).map(|k| (k % 13) as f64).collect();
-        let (mut y, mut blocks) = (
-            vec![0.0; x.len()],
-            Blocks::of_pattern([block; 2], &offsets, &columns).expect("whole blocks"),
-        );
-        let mut best = [f64::INFINITY; 4];
-        let mut take = |place: usize, act: &mut dyn FnMut()| {
-            let begin = report::processor_seconds();
-            act();
-            best[place] = best[place].min(report::processor_seconds() - begin);
-        };
-        for _ in 0..30 {
-            take(3, &mut || blocks.fill(&offsets, &values));
-            take(0, &mut || {
-                for (y, row) in y.iter_mut().zip(offsets.windows(2)) {
-                    let row = row[0] as usize..row[1] as usize;
-                    let terms = values[row.clone()].iter().zip(&columns[row]);
-                    *y = terms.map(|(value, &column)| value * x[column as usize]).sum();
-                }
-            });
-            take(1, &mut || blocks.multiply(&x, &mut y));
-            take(2, &mut || blocks.multiply_plain(&x, &mut y));
-        }
-        let entries = columns.len() as f64;
-        let rate = |bytes: f64, seconds: f64| entries * bytes / seconds * 1e-9;
-        let per_block = 4.0 + 4.0 / (block * block) as f64;
-        println!(
-            "| {name} | {} | {:.2} | {:.0} | {:.2} | {:.0} | {:.2} | {:.2} |",
-            columns.len(),
-            1e3 * best[0],
-            rate(12.0, best[0]),
-            1e3 * best[1],
-            rate(per_block, best[1]),
-            1e3 * best[2],
-            1e3 * best[3]
-        );
-    }
-}
-
-/// Compressed rows of `block` unknowns at each node of a lattice, coupled to all nodes around.
-fn neighbours(block: usize, side: [usize; 3]) -> (Vec<i32>, Vec<i32>) {
-    let (mut offsets, mut columns) = (vec![0], Vec::new());
-    let around = |k: usize, n: usize| k.saturating_sub(1)..=(k + 1).min(n - 1);
-    for node in 0..side.iter().product() {
-        let place = [node % side[0], node / side[0] % side[1], node / (side[0] * side[1])];
-        for _ in 0..block {
-            for k in around(place[2], side[2]) {
-                for j in around(place[1], side[1]) {
-                    for i in around(place[0], side[0]) {
-                        let first = block * ((k * side[1] + j) * side[0] + i);
-                        columns.extend((first..first + block).map(|column| column as i32));
-                    }
-                }
-            }
-            offsets.push(columns.len() as i32);
-        }
-    }
-    (offsets, columns)
 }
 
 /// Lagrangian §7.3 at h = 0.125 m with 6 x 6 points.

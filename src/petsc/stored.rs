@@ -1,0 +1,66 @@
+//! How the values of blocks are kept, in single or in double precision, and what their kernels share.
+
+/// A number as it is stored; it counts as double precision.
+pub trait Stored: Copy + Default + Into<f64> + Send + Sync + 'static {
+    const DOUBLE: bool;
+    fn rounded(value: f64) -> Self;
+}
+
+impl Stored for f32 {
+    const DOUBLE: bool = false;
+    fn rounded(value: f64) -> Self {
+        value as f32
+    }
+}
+
+impl Stored for f64 {
+    const DOUBLE: bool = true;
+    fn rounded(value: f64) -> Self {
+        value
+    }
+}
+
+/// Kernels load four values, of which the last of a block of 3x3 may lie beyond it.
+pub(super) const BEYOND: usize = 1;
+
+/// Bytes of values between what is used and what is asked for: the rows are too short for the
+/// processor to foresee the next ones.
+pub(super) const AHEAD: usize = 8192;
+
+/// a b + c, rounded once where the instruction set can.
+#[inline(always)]
+pub(super) fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// Asks for what lies `ahead` bytes further on.
+#[inline(always)]
+pub(super) fn fetch<T>(here: *const T, ahead: usize) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a hint that reads nothing, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(here.cast::<i8>().wrapping_add(ahead)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (here, ahead);
+}
+
+/// Four values in a vector.
+///
+/// # Safety
+/// They are there.
+#[cfg(target_arch = "x86_64")]
+#[inline]
+#[target_feature(enable = "avx2,fma")]
+pub(super) unsafe fn load<T: Stored>(from: *const T) -> std::arch::x86_64::__m256d {
+    use std::arch::x86_64::{_mm_loadu_ps, _mm256_cvtps_pd, _mm256_loadu_pd};
+    // SAFETY: the caller's, and the type is the one that `DOUBLE` says.
+    unsafe {
+        if T::DOUBLE {
+            _mm256_loadu_pd(from.cast())
+        } else {
+            _mm256_cvtps_pd(_mm_loadu_ps(from.cast()))
+        }
+    }
+}
