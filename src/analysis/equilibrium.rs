@@ -17,9 +17,9 @@ use crate::error::Result;
 use crate::grid::Grid;
 use crate::multigrid::{self, Assembled};
 use crate::parallel::World;
-use crate::petsc::{BlockProduct, Hierarchy};
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::{NewtonProblem, Verdict};
+use crate::petsc::{BlockProduct, Hierarchy};
 use crate::points::Points;
 
 use super::discretise::Discretisation;

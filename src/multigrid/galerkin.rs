@@ -44,11 +44,7 @@ impl Seen {
     }
 
     fn number(&self, place: usize) -> i32 {
-        if place < self.owned {
-            self.first + place as i32
-        } else {
-            self.ghosts[place - self.owned]
-        }
+        if place < self.owned { self.first + place as i32 } else { self.ghosts[place - self.owned] }
     }
 }
 
@@ -97,9 +93,8 @@ pub fn coarse_operator<const K: usize, const C: usize>(
     let each = || received.iter().flat_map(|(_, words)| words.chunks_exact(2 + C * C));
     ghosts.extend(each().map(|entry| entry[1] as i32));
     let known = Seen::new(aggregates, ghosts);
-    let place: Vec<u32> = (0..seen.len())
-        .map(|place| known.place(seen.number(place)) as u32)
-        .collect();
+    let place: Vec<u32> =
+        (0..seen.len()).map(|place| known.place(seen.number(place)) as u32).collect();
     sums.rows.truncate(seen.owned);
     for entries in &mut sums.rows {
         entries.iter_mut().for_each(|(column, _)| *column = place[*column as usize]);
@@ -182,7 +177,11 @@ fn multiply_in<const K: usize, const C: usize, const FUSED: bool>(
         });
         for (&place, left) in places[range.clone()].iter().zip(&prolongator.values[range]) {
             for (&column, right) in columns.iter().zip(&products) {
-                add_transposed_product::<K, C, FUSED>(sums.block(place as usize, column), left, right);
+                add_transposed_product::<K, C, FUSED>(
+                    sums.block(place as usize, column),
+                    left,
+                    right,
+                );
             }
         }
         columns.iter().for_each(|&place| slot[place as usize] = NONE);
@@ -251,11 +250,8 @@ fn coarse_nodes(
     known: &Seen,
 ) -> Result<Nodes> {
     let owners = Owners::of(world, aggregates);
-    let ghosts: Vec<(usize, usize)> = known
-        .ghosts
-        .iter()
-        .map(|&number| (owners.of_number(number), number as usize))
-        .collect();
+    let ghosts: Vec<(usize, usize)> =
+        known.ghosts.iter().map(|&number| (owners.of_number(number), number as usize)).collect();
     let first = known.first as usize;
     let halo = HaloPlan::build(world, known.owned, &ghosts, |number| {
         number.checked_sub(first).filter(|&place| place < known.owned)

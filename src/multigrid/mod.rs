@@ -122,25 +122,23 @@ fn coarsen<const K: usize, const C: usize>(
     if aggregates.total == 0 || aggregates.total as f64 > gain * all as f64 {
         return Ok(None);
     }
-    let mut inverse = vec![0.0; nodes.owned * K];
-    for row in 0..nodes.owned {
-        rows.visit(row, |column, block| {
-            if column == row {
-                for k in (0..K).filter(|&k| block[k][k] > 0.0) {
-                    inverse[row * K + k] = 1.0 / block[k][k];
-                }
-            }
-        });
-    }
+    let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };
+    let inverse: Vec<f64> = product.diagonal().into_iter().map(one_over).collect();
     let largest = spectrum::largest::<K>(world, nodes, &product, &inverse)?;
     let lengths = Lengths::measured(world, nodes, &aggregates, length);
     let damping = if largest > 0.0 { DAMPING / largest } else { 0.0 };
-    let parts =
-        Parts { nodes, strong: &strong, aggregates: &aggregates, lengths, inverse: &inverse, damping };
+    let parts = Parts {
+        nodes,
+        strong: &strong,
+        aggregates: &aggregates,
+        lengths,
+        inverse: &inverse,
+        damping,
+    };
     let prolongator = Prolongator::<K, C>::smoothed(world, rows, &parts)?;
     let coarse = galerkin::coarse_operator(world, nodes, rows, &prolongator, &aggregates)?;
     let transfer = transfer(nodes, &prolongator, &coarse.nodes);
-    let level = Smoothed { product, inverse, largest, transfer };
+    let level = Smoothed { product, largest, transfer };
     Ok(Some((level, coarse, lengths.coarse)))
 }
 
@@ -173,14 +171,20 @@ fn transfer<const K: usize, const C: usize>(
     let first = coarse.first();
     let ghosts = &coarse.global[coarse.owned..];
     let count = prolongator.offsets[fine.owned];
-    BlockProduct::collect::<K, C>(fine.owned, coarse.owned, ghosts.to_vec(), count, |row, blocks| {
-        let (columns, values) = prolongator.row(row);
-        blocks.extend(columns.iter().zip(values).map(|(&number, block)| {
-            let own = number.wrapping_sub(first) as usize;
-            let ghost = || coarse.owned + ghosts.partition_point(|&ghost| ghost < number);
-            (if own < coarse.owned { own } else { ghost() }, *block)
-        }));
-    })
+    BlockProduct::collect::<K, C>(
+        fine.owned,
+        coarse.owned,
+        ghosts.to_vec(),
+        count,
+        |row, blocks| {
+            let (columns, values) = prolongator.row(row);
+            blocks.extend(columns.iter().zip(values).map(|(&number, block)| {
+                let own = number.wrapping_sub(first) as usize;
+                let ghost = || coarse.owned + ghosts.partition_point(|&ghost| ghost < number);
+                (if own < coarse.owned { own } else { ghost() }, *block)
+            }));
+        },
+    )
 }
 
 /// The last level in compressed rows. A motion that no node of the finer level takes part in has

@@ -102,6 +102,19 @@ impl<T: Stored> BlockProduct<T> {
         self.other = other.finish();
     }
 
+    /// Diagonal entries of a symmetric matrix, else none.
+    pub fn diagonal(&self) -> Vec<f64> {
+        match &self.own {
+            Own::Whole(_) => Vec::new(),
+            Own::Symmetric(half) => half.diagonal(),
+        }
+    }
+
+    /// Scalar rows.
+    pub fn rows(&self) -> usize {
+        self.size[0]
+    }
+
     /// y = A x with the ghosts' values behind the own ones in `x`.
     pub fn multiply_local(&self, x: &[f64], y: &mut [f64]) {
         let (own, ghosts) = x.split_at(self.size[1]);
@@ -165,7 +178,6 @@ pub(super) struct Shell<T>(Object<sys::Mat>, PhantomData<T>);
 /// What the shell multiplies by.
 struct Context<T> {
     product: BlockProduct<T>,
-    diagonal: Vec<f64>,
     ghosts: Option<Ghosts>,
 }
 
@@ -176,19 +188,21 @@ struct Ghosts {
 }
 
 impl<T: Stored> Shell<T> {
-    /// `diagonal`: of a square matrix, else empty. Collective.
-    pub(super) fn new(
-        comm: &SimpleCommunicator,
-        product: BlockProduct<T>,
-        diagonal: Vec<f64>,
-    ) -> Result<Self> {
+    /// Collective.
+    pub(super) fn new(comm: &SimpleCommunicator, product: BlockProduct<T>) -> Result<Self> {
         let [rows, columns] = [index(product.size[0])?, index(product.size[1])?];
         let mut shell = Object(null_mut());
-        let data = Box::new(Context { product, diagonal, ghosts: None });
+        let data = Box::new(Context { product, ghosts: None });
         let data = Box::into_raw(data);
         let all = sys::PETSC_DETERMINE;
         petsc!(MatCreateShell(
-            comm.as_raw(), rows, columns, all, all, data.cast::<c_void>(), &mut shell.0
+            comm.as_raw(),
+            rows,
+            columns,
+            all,
+            all,
+            data.cast::<c_void>(),
+            &mut shell.0
         ))?;
         petsc!(MatShellSetContextDestroy(shell.0, Some(destroy::<T>)))?;
         // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls each, by its
@@ -230,7 +244,10 @@ impl<T: Stored> Shell<T> {
         petsc!(MatShellGetContext(self.raw(), (&raw mut data).cast()))?;
         // SAFETY: the box that `new` gave up lives as long as the shell, and PETSc is not
         // multiplying while this runs.
-        act(unsafe { &mut (*data.cast::<Context<T>>()).product })
+        act(unsafe { &mut (*data.cast::<Context<T>>()).product })?;
+        // The way to tell users of the matrix.
+        petsc!(MatAssemblyBegin(self.raw(), sys::MAT_FINAL_ASSEMBLY))?;
+        petsc!(MatAssemblyEnd(self.raw(), sys::MAT_FINAL_ASSEMBLY))
     }
 }
 
@@ -342,10 +359,11 @@ unsafe extern "C" fn get_diagonal<T: Stored>(
     with_context::<T>(shell, |context| {
         // SAFETY: PETSc's vector lives through the call.
         let mut values = unsafe { ValuesMut::of(diagonal)? };
-        if values.len() != context.diagonal.len() {
+        let entries = context.product.diagonal();
+        if values.len() != entries.len() {
             return Err(Error::Environment("this matrix has no diagonal".into()));
         }
-        values.copy_from_slice(&context.diagonal);
+        values.copy_from_slice(&entries);
         Ok(())
     })
 }

@@ -107,6 +107,20 @@ impl<T: Stored> Half<T> {
         self.values.extend([T::default(); BEYOND]);
     }
 
+    /// The diagonal entries.
+    pub fn diagonal(&self) -> Vec<f64> {
+        let size = match self.shape {
+            Shape::Two => 2,
+            Shape::Three => 3,
+        };
+        let ends = self.offsets.iter().skip(1).enumerate();
+        ends.flat_map(|(row, &end)| {
+            let first = (end as usize + row) * size * size;
+            (0..size).map(move |k| self.values[first + k * (size + 1)].into())
+        })
+        .collect()
+    }
+
     /// Lower and diagonal ones.
     fn blocks(&self) -> usize {
         self.columns.len() + self.offsets.len() - 1
@@ -120,11 +134,6 @@ impl<T: Stored> Half<T> {
     /// y += A x.
     pub fn multiply_add(&self, x: &[f64], y: &mut [f64]) {
         self.run::<true>(x, y);
-    }
-
-    /// y = A^T x, the same.
-    pub fn multiply_transposed(&self, x: &[f64], y: &mut [f64]) {
-        self.multiply(x, y);
     }
 
     /// y = A x or y += A x, in the fastest form that the processor knows.

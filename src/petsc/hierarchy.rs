@@ -27,8 +27,6 @@ pub struct Hierarchy {
 pub struct Smoothed {
     /// Its matrix A.
     pub product: BlockProduct<f32>,
-    /// One over the diagonal of the owned rows, zero where that is not positive.
-    pub inverse: Vec<f64>,
     /// Largest eigenvalue of D^-1 A.
     pub largest: f64,
     /// P, from the next level to this one.
@@ -63,7 +61,13 @@ pub(super) struct Installed {
     filled: sys::PetscObjectState,
     exact: Shell<f64>,
     finest: Shell<f32>,
+    /// Iterations per digit of the first solve.
+    pace: Option<f64>,
+    slow: bool,
 }
+
+/// New levels cost about as much as so many iterations (measured: 20 in the plane, 40 in space).
+const WORTH: f64 = 25.0;
 
 impl Installed {
     /// Puts the levels under a solver with operators; whatever it had goes. Collective.
@@ -91,20 +95,23 @@ impl Installed {
         Ok(Installed {
             made: state,
             filled: state,
-            exact: Shell::new(comm, exact, Vec::new())?,
+            exact: Shell::new(comm, exact)?,
             finest: finest.ok_or_else(none)?,
+            pace: None,
+            slow: false,
         })
     }
 
-    /// Whether the levels belong to other values of the matrix than those of `state`.
-    pub fn outdated(&self, state: sys::PetscObjectState) -> bool {
-        self.made != state
+    /// Whether the levels shall serve for the matrix of `state`; `kept`: the user's lag says so.
+    pub fn serves(&self, state: sys::PetscObjectState, kept: bool) -> bool {
+        self.made == state || (kept && !self.slow)
     }
 
     /// Lets `fill` write the values of `state` where the finest matrix is multiplied by, if they
-    /// are not there yet; the other levels stay.
+    /// are not there yet; its smoother follows, the other levels stay.
     pub fn follow(
         &mut self,
+        ksp: sys::KSP,
         state: sys::PetscObjectState,
         fill: impl FnOnce(&mut BlockProduct<f64>) -> Result<()>,
     ) -> Result<()> {
@@ -119,12 +126,26 @@ impl Installed {
                 exact.round_into(rounded);
                 Ok(())
             })
-        })
+        })?;
+        let (mut pc, mut levels, mut smoother) = (null_mut(), 0, null_mut());
+        petsc!(KSPGetPC(ksp, &mut pc))?;
+        petsc!(PCMGGetLevels(pc, &mut levels))?;
+        petsc!(PCMGGetSmoother(pc, levels - 1, &mut smoother))?;
+        petsc!(KSPSetUp(smoother))
     }
 
     /// Makes the solver's iteration multiply by the exact copy. `matrix` is what it stands for.
     pub fn multiply_by_copy(&self, ksp: sys::KSP, matrix: sys::Mat) -> Result<()> {
         petsc!(KSPSetOperators(ksp, self.exact.raw(), matrix))
+    }
+
+    /// Takes note of a solve: levels that have become slow are not kept.
+    pub fn learn(&mut self, iterations: usize, tolerance: f64) {
+        let (iterations, digits) = (iterations as f64, -tolerance.log10());
+        match self.pace {
+            None => self.pace = Some(iterations / digits),
+            Some(pace) => self.slow = iterations - pace * digits > WORTH,
+        }
     }
 }
 
@@ -135,18 +156,17 @@ fn put_level(
     level: sys::PetscInt,
     smoothed: Smoothed,
 ) -> Result<Shell<f32>> {
-    let Smoothed { product, inverse, largest, transfer } = smoothed;
+    let Smoothed { product, largest, transfer } = smoothed;
     let (mut smoother, mut inner) = (null_mut(), null_mut());
     petsc!(PCMGGetSmoother(pc, level, &mut smoother))?;
     petsc!(KSPSetType(smoother, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
     petsc!(KSPGetPC(smoother, &mut inner))?;
     petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?;
-    let diagonal = inverse.iter().map(|&v| if v > 0.0 { 1.0 / v } else { 0.0 }).collect();
-    let matrix = Shell::new(comm, product, diagonal)?;
+    let matrix = Shell::new(comm, product)?;
     petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
     let [low, high] = SMOOTHED.map(|share| share * largest);
     petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
-    let transfer = Shell::new(comm, transfer, Vec::new())?;
+    let transfer = Shell::new(comm, transfer)?;
     petsc!(PCMGSetInterpolation(pc, level, transfer.raw()))?;
     petsc!(PCMGSetRestriction(pc, level, transfer.raw()))?;
     Ok(matrix)

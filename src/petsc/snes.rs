@@ -13,9 +13,9 @@ use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
 use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
+use super::hierarchy::{self, Hierarchy, Installed};
 use super::ksp;
 use super::vector::{Values, ValuesMut, index};
-use super::hierarchy::{self, Hierarchy, Installed};
 use super::{BlockProduct, Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
@@ -286,8 +286,8 @@ impl<P: NewtonProblem> Context<'_, P> {
         let (mut kept, mut state) = (sys::PETSC_FALSE, 0);
         petsc!(KSPGetReusePreconditioner(inner, &mut kept))?;
         petsc!(PetscObjectStateGet(self.matrix.raw().cast(), &mut state))?;
-        let serves = |levels: &Installed| kept != sys::PETSC_FALSE || !levels.outdated(state);
-        if !self.levels.as_ref().is_some_and(serves) {
+        let kept = kept != sys::PETSC_FALSE;
+        if !self.levels.as_ref().is_some_and(|levels| levels.serves(state, kept)) {
             let made = self.problem.hierarchy(self.matrix);
             let made = agree(self.comm, made)?;
             let install = |made| Installed::new(inner, self.comm, state, made);
@@ -295,7 +295,7 @@ impl<P: NewtonProblem> Context<'_, P> {
         }
         let Some(levels) = &mut self.levels else { return Ok(()) };
         let (problem, matrix) = (&mut *self.problem, &mut *self.matrix);
-        levels.follow(state, |exact| problem.fill(matrix, exact))?;
+        levels.follow(inner, state, |exact| problem.fill(matrix, exact))?;
         levels.multiply_by_copy(inner, self.matrix.raw())
     }
 
@@ -377,6 +377,9 @@ unsafe extern "C" fn after_solve<P: NewtonProblem>(
         let mut tolerance = 0.0;
         petsc!(KSPGetTolerances(inner, &mut tolerance, null_mut(), null_mut(), null_mut()))?;
         context.linear_tolerances.push(tolerance);
+        if let Some(levels) = &mut context.levels {
+            levels.learn(outcome.iterations, tolerance);
+        }
         context.linear_solves += 1;
         context.linear_total += outcome.iterations;
         context.linear_max = context.linear_max.max(outcome.iterations);

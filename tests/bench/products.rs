@@ -24,16 +24,15 @@ const CASES: [Case; 10] = [
     ("3D, 125", 3, [32, 32, 32], 2),
 ];
 
-/// Kinds of work: rows, blocks, half, plain forms of both,
-/// rounding both.
-const KINDS: usize = 7;
+/// Kinds of work: rows, blocks, half, plain forms of both, half in double precision.
+const KINDS: usize = 6;
 const ROUNDS: usize = 20;
 
 pub fn products() {
     println!("\nleast of {ROUNDS} rounds in turn, ms and GB/s by wall time");
     println!(
         "| matrix, neighbours | nodes | MB of blocks | rows | blocks | half | gain | plain | \
-         plain half | rounding | rounding half | two at once: rows | blocks | half | gain |"
+         plain half | double half | two at once: rows | blocks | half | gain | double half |"
     );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for (name, block, side, reach) in CASES {
@@ -48,16 +47,44 @@ pub fn products() {
             })
         };
         println!(
-            "| {name} | {} | {:.0} | {} | {:.2} | {} | {} | {:.2} |",
+            "| {name} | {} | {:.0} | {} | {:.2} | {} | {} | {:.2} | {:.2} |",
             side.iter().product::<usize>(),
             megabytes(per),
             rates(&one, 1.0).join(" | "),
             one[1] / one[2],
             one[3..].iter().map(|t| format!("{:.2}", 1e3 * t)).collect::<Vec<_>>().join(" | "),
             rates(&two, 2.0).join(" | "),
-            two[1] / two[2]
+            two[1] / two[2],
+            1e3 * two[5]
         );
     }
+}
+
+/// In blocks, half of them, and half in double precision.
+fn kept<const K: usize>(
+    offsets: &[i32],
+    columns: &[i32],
+    values: &[f64],
+) -> (Blocks<f32>, Half<f32>, Half<f64>) {
+    let count = columns.len() / (K * K);
+    let room = "blocks with a kernel";
+    let mut blocks = Blocks::growing([K, K], count).expect(room);
+    let mut half = Half::growing(K, count / 2).expect(room);
+    let mut exact = Half::growing(K, count / 2).expect(room);
+    let mut row = Vec::new();
+    for first in (0..offsets.len() - 1).step_by(K) {
+        let (start, end) = (offsets[first] as usize, offsets[first + 1] as usize);
+        row.clear();
+        row.extend((0..(end - start) / K).map(|k| {
+            let at = |r: usize, c: usize| values[offsets[first + r] as usize + k * K + c];
+            let block: [[f64; K]; K] = std::array::from_fn(|r| std::array::from_fn(|c| at(r, c)));
+            (columns[start + k * K] as usize / K, block)
+        }));
+        blocks.push(&row);
+        half.push(&row);
+        exact.push(&row);
+    }
+    (blocks.finish(), half, exact)
 }
 
 /// Seconds of each kind of work on `cores` cores at once, each on its own copy: of the slowest in
@@ -69,8 +96,11 @@ fn least(cores: usize, block: usize, offsets: &[i32], columns: &[i32]) -> [f64; 
         let values: Vec<f64> = (0..columns.len()).map(|k| (k % 101) as f64 - 50.0).collect();
         let x: Vec<f64> = (1..offsets.len()).map(|k| (k % 13) as f64).collect();
         let mut y = vec![0.0; x.len()];
-        let mut blocks = Blocks::of_pattern([block; 2], &offsets, &columns).expect("whole blocks");
-        let mut half = Half::of_pattern(block, &offsets, &columns).expect("a symmetric pattern");
+        let (blocks, half, exact) = if block == 2 {
+            kept::<2>(&offsets, &columns, &values)
+        } else {
+            kept::<3>(&offsets, &columns, &values)
+        };
         let mut round = || {
             let mut act = |kind: usize| match kind {
                 0 => multiply_rows(&offsets, &columns, &values, &x, &mut y),
@@ -78,8 +108,7 @@ fn least(cores: usize, block: usize, offsets: &[i32], columns: &[i32]) -> [f64; 
                 2 => half.multiply(&x, &mut y),
                 3 => blocks.multiply_plain(&x, &mut y),
                 4 => half.multiply_plain(&x, &mut y),
-                5 => blocks.fill(&offsets, &values),
-                _ => half.fill(&offsets, &values),
+                _ => exact.multiply(&x, &mut y),
             };
             std::array::from_fn(|kind| {
                 start.wait();
