@@ -215,8 +215,9 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
         inverted: deck.analysis.inverted_iterates,
     };
     let external = vec![0.0; owned];
+    let grid = &model.grid;
     let mut problem =
-        Equilibrium::new(world, &mesh, step, &conditions, &left_out, external, settings)?;
+        Equilibrium::new(world, grid, &mesh, step, &conditions, &left_out, external, settings)?;
     let values = vec![0.0; pattern.ghost_start * D * D];
     let mut matrix = solver::matrix(world, &model.grid, numbering, pattern, &values)?;
     let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);

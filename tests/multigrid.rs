@@ -390,7 +390,7 @@ impl<const D: usize> Hardening<'_, D> {
 impl<const D: usize> NewtonProblem for Hardening<'_, D> {
     fn residual(&mut self, x: &[f64], f: &mut [f64], _: &mut Matrix) -> Result<bool> {
         let mut all = x.to_vec();
-        all.resize(self.share.nodes.len() * D, 0.0);
+        all.resize(self.share.nodes.local() * D, 0.0);
         self.share.nodes.halo.forward(self.world, &mut all, D)?;
         let BlockRows { offsets, columns, values } = &self.share.rows;
         for row in 0..self.share.nodes.owned {

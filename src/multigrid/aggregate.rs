@@ -45,7 +45,7 @@ impl Aggregates {
         let roots: Vec<u32> =
             (0..nodes.owned as u32).filter(|&node| state[node as usize] == ROOT).collect();
         let (first, total) = (world.exclusive_sum(roots.len()), world.sum_usize(roots.len()));
-        let mut group = vec![None; nodes.len()];
+        let mut group = vec![None; nodes.local()];
         for (k, &root) in roots.iter().enumerate() {
             let (key, position) = (nodes.key[root as usize], nodes.position[root as usize]);
             group[root as usize] = Some(Group { number: (first + k) as i32, key, root: position });
@@ -89,7 +89,7 @@ impl Aggregates {
     /// Tells other ranks about the groups of their ghosts.
     fn share(&mut self, world: &World, nodes: &Nodes) -> Result<()> {
         const VALUES: usize = 5;
-        let mut values = vec![-1.0; nodes.len() * VALUES];
+        let mut values = vec![-1.0; nodes.local() * VALUES];
         let owned = self.group[..nodes.owned].iter().zip(values.chunks_exact_mut(VALUES));
         for (group, values) in owned.filter_map(|(group, values)| Some((group.as_ref()?, values))) {
             let [x, y, z] = group.root;
@@ -121,7 +121,7 @@ fn roots(world: &World, nodes: &Nodes, strong: &Strong, distance: usize) -> Resu
         around.fold(state[node], f64::max)
     };
     nodes.halo.forward(world, &mut state, 1)?;
-    let mut near = vec![OUT; nodes.len()];
+    let mut near = vec![OUT; nodes.local()];
     let candidate = |state: f64| state != OUT && state != ROOT;
     while world.any(state[..nodes.owned].iter().any(|&state| candidate(state))) {
         for (node, near) in near.iter_mut().enumerate().take(nodes.owned) {

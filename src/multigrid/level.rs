@@ -19,7 +19,7 @@ pub struct Nodes {
 
 impl Nodes {
     /// Owned nodes and ghosts.
-    pub fn len(&self) -> usize {
+    pub fn local(&self) -> usize {
         self.global.len()
     }
 

@@ -199,7 +199,7 @@ pub fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
 /// 1 for a degree of freedom that is coupled to others, 0 for one that is held: it does not take
 /// part in motions. Of all local nodes. Collective.
 fn free<const K: usize>(world: &World, nodes: &Nodes, rows: &impl Rows<K>) -> Result<Vec<f64>> {
-    let mut free = vec![0.0; nodes.len() * K];
+    let mut free = vec![0.0; nodes.local() * K];
     for row in 0..nodes.owned {
         rows.visit(row, |column, block| {
             for (r, line) in block.iter().enumerate() {

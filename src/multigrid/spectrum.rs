@@ -30,7 +30,7 @@ pub fn largest<const K: usize>(
         .collect();
     let dot = |a: &[f64], b: &[f64]| world.sum(a.iter().zip(b).map(|(a, b)| a * b).sum());
     let mut beta = dot(&v, &v).sqrt();
-    let (mut before, mut x) = (vec![0.0; owned], vec![0.0; nodes.len() * K]);
+    let (mut before, mut x) = (vec![0.0; owned], vec![0.0; nodes.local() * K]);
     let mut w = vec![0.0; owned];
     let (mut diagonal, mut beside) = (Vec::new(), Vec::new());
     let smallest = beta * 1e-12;

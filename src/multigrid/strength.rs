@@ -22,7 +22,7 @@ impl Strong {
         threshold: f64,
     ) -> Result<Self> {
         let square = |block: &[[f64; K]; K]| -> f64 { block.iter().flatten().map(|v| v * v).sum() };
-        let mut scale = vec![0.0; nodes.len()];
+        let mut scale = vec![0.0; nodes.local()];
         for row in 0..nodes.owned {
             rows.visit(row, |column, block| {
                 if column == row {
