@@ -353,7 +353,8 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     };
     let equations = || {
         let external = vec![0.0; owned];
-        Equilibrium::new(world, &mesh, step, &conditions, &left_out, external, settings)
+        let grid = &model.grid;
+        Equilibrium::new(world, grid, &mesh, step, &conditions, &left_out, external, settings)
     };
     let matrix_cost = sample(count, || {
         black_box((empty().is_ok(), equations().is_ok()));
