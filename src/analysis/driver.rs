@@ -22,7 +22,7 @@ use crate::petsc::session::{self, Session};
 use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
-use super::{balance, conditioning, explicit, implicit_dynamic, quasi_static};
+use super::{balance, conditioning, discretise, explicit, implicit_dynamic, quasi_static};
 use super::{plan, setup, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
@@ -139,10 +139,13 @@ impl Run<'_> {
                 (model, points, Some((resume, used, step)))
             }
         };
+        let active = discretise::active(world, &model, &points)?;
         if resume.is_none() && model.deck.analysis.kind == AnalysisType::QuasiStatic {
-            support::require(world, &model, &points, quasi_static::first_span(&model.deck))?;
+            let first = quasi_static::first_span(&model.deck);
+            support::require(world, &model, &points, &active, first)?;
         }
-        self.log.say(&report::plan(&plan::of(world, &model, &points)?));
+        self.log.say(&report::plan(&plan::of(world, &model, &points, &active)));
+        drop(active);
         if self.arguments.check {
             self.log.say("The deck is good; nothing was run (--check).");
             return Ok(());
