@@ -23,11 +23,12 @@ use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
 use super::{balance, conditioning, discretise, explicit, implicit_dynamic, quasi_static};
-use super::{plan, setup, support};
+use super::{plan, process, setup, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
+    process::before_start();
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();
@@ -168,6 +169,7 @@ impl Run<'_> {
         let mut recorder =
             Recorder::create(world, &model.deck, directory, log, versions, checkpointer, resume)?;
         signals::listen();
+        process::before_steps();
         clock.end_setup();
 
         let outcome = match model.deck.analysis.kind {
