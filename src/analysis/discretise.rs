@@ -146,12 +146,7 @@ impl<const D: usize> Discretisation<D> {
         if matches!(grid, Grid::Mesh(_)) {
             reached.extend_from_slice(&groups.nodes);
         }
-        let of_others = populated.reached.iter().filter(|&&cell| {
-            world.size() > 1 && populated.owned.binary_search_by_key(&cell, |own| own.0).is_err()
-        });
-        for &cell in populated.owned.iter().map(|(cell, _)| cell).chain(of_others) {
-            grid.cell_nodes(cell, &mut reached);
-        }
+        append_nodes(world, grid, &populated, &mut reached);
         let touched = Touched::settle(world, grid, partition, reached)?;
         let supports = (0..groups.len())
             .map(|g| groups.nodes(g))
@@ -249,6 +244,36 @@ impl<const D: usize> Discretisation<D> {
             .zip(&self.on_face)
             .map(|(&grip, &on_face)| !on_face && grip <= threshold * largest)
             .collect()
+    }
+}
+
+/// The populated cells and the nodes at them: all that is known of a step's system before it is
+/// built. Collective.
+pub fn active<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> Result<(Populated, Touched)> {
+    let (grid, partition) = (&model.grid, &model.partition);
+    let populated = Populated::find(world, grid, partition, model.deck.method.basis, points)?;
+    let mut reached = Vec::new();
+    append_nodes(world, grid, &populated, &mut reached);
+    let touched = Touched::settle(world, grid, partition, reached)?;
+    Ok((populated, touched))
+}
+
+/// Appends the nodes of the populated cells owned or reached here.
+fn append_nodes<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    populated: &Populated,
+    nodes: &mut Vec<usize>,
+) {
+    let of_others = populated.reached.iter().filter(|&&cell| {
+        world.size() > 1 && populated.owned.binary_search_by_key(&cell, |own| own.0).is_err()
+    });
+    for &cell in populated.owned.iter().map(|(cell, _)| cell).chain(of_others) {
+        grid.cell_nodes(cell, nodes);
     }
 }
 

@@ -22,12 +22,13 @@ use crate::petsc::session::{self, Session};
 use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
-use super::{balance, conditioning, explicit, implicit_dynamic, quasi_static};
-use super::{plan, setup, support};
+use super::{balance, conditioning, discretise, explicit, implicit_dynamic, quasi_static};
+use super::{plan, process, setup, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
+    process::before_start();
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();
@@ -139,10 +140,13 @@ impl Run<'_> {
                 (model, points, Some((resume, used, step)))
             }
         };
+        let active = discretise::active(world, &model, &points)?;
         if resume.is_none() && model.deck.analysis.kind == AnalysisType::QuasiStatic {
-            support::require(world, &model, &points, quasi_static::first_span(&model.deck))?;
+            let first = quasi_static::first_span(&model.deck);
+            support::require(world, &model, &points, &active, first)?;
         }
-        self.log.say(&report::plan(&plan::of(world, &model, &points)?));
+        self.log.say(&report::plan(&plan::of(world, &model, &points, &active)));
+        drop(active);
         if self.arguments.check {
             self.log.say("The deck is good; nothing was run (--check).");
             return Ok(());
@@ -165,6 +169,7 @@ impl Run<'_> {
         let mut recorder =
             Recorder::create(world, &model.deck, directory, log, versions, checkpointer, resume)?;
         signals::listen();
+        process::before_steps();
         clock.end_setup();
 
         let outcome = match model.deck.analysis.kind {

@@ -23,7 +23,7 @@
 //! | cut and grow load steps | `stepping.rs` | |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
-//! | a run from command line to results | `driver.rs`, `plan.rs` | |
+//! | a run from command line to results | `driver.rs`, `plan.rs`, `process.rs` | |
 //! | rows, frames, summary | `recorder.rs`, `clock.rs` | |
 //! | checkpoints and restarts | `checkpointing.rs` | |
 
@@ -46,6 +46,7 @@ pub mod motion;
 pub mod newmark;
 pub mod newton;
 pub mod plan;
+mod process;
 pub mod quasi_static;
 pub mod reactions;
 pub mod recorder;

@@ -3,7 +3,6 @@
 use crate::assembly::Populated;
 use crate::assembly::numbering::Touched;
 use crate::deck::model::{Basis, Every};
-use crate::error::Result;
 use crate::output::report::Plan;
 use crate::parallel::World;
 use crate::points::Points;
@@ -11,16 +10,15 @@ use crate::points::Points;
 use super::balance::imbalance;
 use super::discretise::Model;
 
-/// Counts the first step's system without building it. Collective.
-pub fn of<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Plan> {
+/// Counts the first step's system from its cells and nodes ([`super::discretise::active`]).
+/// Collective.
+pub fn of<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    (populated, touched): &(Populated, Touched),
+) -> Plan {
     let deck = &model.deck;
-    let populated =
-        Populated::find(world, &model.grid, &model.partition, deck.method.basis, points)?;
-    let mut reached = Vec::new();
-    for &cell in &populated.reached {
-        model.grid.cell_nodes(cell, &mut reached);
-    }
-    let touched = Touched::settle(world, &model.grid, &model.partition, reached)?;
     let nodes = world.sum_usize(touched.owned.len());
     let all_points = world.sum_usize(points.len());
     let mut per_rank = vec![0.0; world.size()];
@@ -30,7 +28,7 @@ pub fn of<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>) -
         (Every::Seconds(seconds), _, Some(duration)) => 1 + (duration / seconds) as usize,
         _ => 1,
     };
-    Ok(Plan {
+    Plan {
         title: deck.title.clone(),
         facts: Vec::new(),
         points: all_points,
@@ -42,7 +40,7 @@ pub fn of<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>) -
         cut_faces: None,
         estimated_memory: Some(memory::<D>(deck.method.basis, all_points, nodes)),
         estimated_output: Some((frames * all_points * output_bytes_per_point(deck)) as u64),
-    })
+    }
 }
 
 /// Points with their influences, and the matrix three times over (ours, PETSc's two parts and
@@ -56,7 +54,8 @@ fn memory<const D: usize>(basis: Basis, points: usize, nodes: usize) -> u64 {
         (_, 2) => (8, 20),
         _ => (30, 90),
     };
-    let per_point = 8 * Points::<D>::record_words() + nodes_each * (16 + 8 * D);
+    let corners = if matches!(basis, Basis::Mpm | Basis::Gimp) { 8 * D } else { 0 };
+    let per_point = 8 * (Points::<D>::record_words() - corners) + nodes_each * (16 + 8 * D);
     let per_node = row * (8 * D * D * 3 + 8);
     (points * per_point + nodes * per_node) as u64
 }

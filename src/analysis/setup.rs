@@ -42,6 +42,7 @@ pub fn restore<const D: usize>(
 ) -> Result<(Model<D>, Points<D>)> {
     let mut grid = world.fail_together(build_grid(&deck))?;
     let Restored { ranks, mut points, mesh_positions, brick, owners, .. } = restored;
+    points.shed(deck.method.basis);
     if let (Grid::Mesh(mesh), Some(positions)) = (&mut grid, mesh_positions) {
         world.fail_together(mesh.set_positions(positions))?;
     }

@@ -3,12 +3,15 @@
 
 use nalgebra::DMatrix;
 
-use crate::assembly::conditions::StepSpan;
+use crate::assembly::conditions::{Conditions, StepSpan};
+use crate::assembly::numbering::Touched;
+use crate::assembly::{Numbering, Populated};
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 use crate::parallel::World;
 use crate::points::Points;
 
-use super::discretise::{Coupling, Discretisation, Model};
+use super::discretise::Model;
 
 /// Share of the largest eigenvalue below which a motion counts as free. The rows are exact but
 /// for rounding; a held line of a thousandth of the body's length leaves 1e-6.
@@ -16,18 +19,28 @@ const FREE: f64 = 1e-12;
 
 /// An error that names the body and the motion. Bodies that share nodes hold each other. Every
 /// held component of a node is a row of the rigid motions' values there; the motions that all
-/// rows annihilate are free. Collective.
+/// rows annihilate are free. The cells and nodes are those of [`super::discretise::active`].
+/// Collective.
 pub fn require<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
+    (populated, nodes): &(Populated, Touched),
     first: StepSpan,
 ) -> Result<()> {
     let (deck, grid) = (&model.deck, &model.grid);
-    let (mesh, conditions) =
-        Discretisation::with_conditions(world, model, points, Coupling::Diagonal, first)?;
+    let numbering = Numbering::build(world, nodes.owned.clone(), &nodes.foreign)?;
+    let conditions = Conditions::evaluate(
+        world,
+        grid,
+        deck.method.basis,
+        &numbering,
+        points,
+        &deck.boundaries,
+        first,
+    )?;
     let bodies = deck.bodies.len();
-    let touched = touched_nodes(world, &mesh, points, bodies)?;
+    let touched = touched_nodes(world, grid, populated, &numbering, bodies)?;
     let groups = sharing(world, &touched, bodies);
     let (middle, length) = extent(world, points);
     let motions = D + D * (D - 1) / 2;
@@ -37,7 +50,7 @@ pub fn require<const D: usize>(
             if !bodies.iter().zip(&groups).any(|(&on, &group)| on && group == lead) {
                 continue;
             }
-            let x = grid.node_position(mesh.numbering.nodes[local]);
+            let x = grid.node_position(numbering.nodes[local]);
             let x: [f64; D] = std::array::from_fn(|a| (x[a] - middle[a]) / length);
             for component in (0..D).filter(|c| conditions.fixed[local * D + c]) {
                 let row = motions_at(&x, component);
@@ -68,16 +81,19 @@ pub fn require<const D: usize>(
 /// Bodies at each owned node.
 fn touched_nodes<const D: usize>(
     world: &World,
-    mesh: &Discretisation<D>,
-    points: &Points<D>,
+    grid: &Grid<D>,
+    populated: &Populated,
+    numbering: &Numbering,
     bodies: usize,
 ) -> Result<Vec<Vec<bool>>> {
-    let numbering = &mesh.numbering;
     let mut flags = vec![0.0; numbering.len() * bodies];
-    for p in 0..points.len() {
-        for entry in mesh.influences.row(p) {
-            if let Some(local) = numbering.local(mesh.influences.nodes[entry]) {
-                flags[local * bodies + points.body[p] as usize] = 1.0;
+    let mut nodes = Vec::new();
+    for &(cell, inside) in &populated.owned {
+        nodes.clear();
+        grid.cell_nodes(cell, &mut nodes);
+        for local in nodes.iter().filter_map(|&node| numbering.local(node)) {
+            for body in (0..bodies).filter(|body| inside >> body & 1 == 1) {
+                flags[local * bodies + body] = 1.0;
             }
         }
     }

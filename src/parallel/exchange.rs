@@ -3,6 +3,7 @@
 //! barrier entered when the own sends are matched; its cost does not grow with the rank count.
 
 use bytemuck::Pod;
+use mpi::point_to_point::{Message, Status};
 use mpi::request::{Request, StaticScope};
 use mpi::traits::*;
 
@@ -40,7 +41,7 @@ pub fn exchange_in_messages<T: Pod>(
             let size = world.size();
             wrong = Err(Error::Environment(format!("a message to rank {rank} of {size}")));
         } else if rank == world.rank() {
-            append(&mut incoming, rank, &list);
+            append(&mut incoming, rank, list);
         } else if !list.is_empty() {
             remote.push((rank, list));
         }
@@ -78,18 +79,25 @@ pub fn send_lists<T: Pod>(world: &World, lists: &[(usize, Vec<T>)]) {
 /// Waits for a list of unknown length from one rank.
 pub fn receive_list<T: Pod>(world: &World, rank: usize) -> Vec<T> {
     let process = world.comm().process_at_rank(rank as i32);
-    let (bytes, _): (Vec<u8>, _) =
-        traffic::waiting(|| process.matched_probe_with_tag(LIST_TAG).matched_receive_vec());
-    let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
-    bytemuck::cast_slice_mut(&mut list).copy_from_slice(&bytes);
+    traffic::waiting(|| {
+        let (message, status) = process.matched_probe_with_tag(LIST_TAG);
+        receive(message, status)
+    })
+}
+
+/// Takes a message that was found by a probe, straight to where it stays.
+fn receive<T: Pod>(message: Message, status: Status) -> Vec<T> {
+    let bytes = status.count(u8::equivalent_datatype()) as usize;
+    let mut list = vec![T::zeroed(); bytes / size_of::<T>()];
+    message.matched_receive_into(bytemuck::cast_slice_mut::<T, u8>(&mut list));
     list
 }
 
 /// Adds to the list of `source`. Messages of one source arrive in the order they were sent.
-fn append<T: Pod>(incoming: &mut Vec<(usize, Vec<T>)>, source: usize, values: &[T]) {
+fn append<T: Pod>(incoming: &mut Vec<(usize, Vec<T>)>, source: usize, values: Vec<T>) {
     match incoming.iter_mut().find(|(rank, _)| *rank == source) {
-        Some((_, list)) => list.extend_from_slice(values),
-        None => incoming.push((source, values.to_vec())),
+        Some((_, list)) => list.extend_from_slice(&values),
+        None => incoming.push((source, values)),
     }
 }
 
@@ -119,10 +127,7 @@ fn swap<T: Pod>(
             while let Some((message, status)) =
                 comm.any_process().immediate_matched_probe_with_tag(tag)
             {
-                let (bytes, _): (Vec<u8>, _) = (message, status).matched_receive_vec();
-                let mut list = vec![T::zeroed(); bytes.len() / size_of::<T>()];
-                bytemuck::cast_slice_mut(&mut list).copy_from_slice(&bytes);
-                append(incoming, status.source_rank() as usize, &list);
+                append(incoming, status.source_rank() as usize, receive(message, status));
             }
             match barrier.take() {
                 Some(request) => match request.test() {

@@ -1,7 +1,7 @@
 //! Points to the ranks that own the cells they are in, over any distance, in one exchange.
 //! Nothing is dropped: a point outside the grid is an error that names it.
 
-use rustc_hash::FxHashMap;
+use std::collections::BTreeMap;
 
 use super::{Partition, World, exchange};
 use crate::error::{Error, Result};
@@ -19,9 +19,41 @@ pub fn migrate<const D: usize>(
     points: &mut Points<D>,
 ) -> Result<usize> {
     let mut cells = locate(world, grid, points)?;
+    let leaving = leaving(world, partition, grid, &cells);
+    let moved = world.sum_usize(leaving.len());
+    let mut kept: Vec<usize> = Vec::new();
+    if moved > 0 {
+        let mut gone = leaving.iter().map(|&(p, _)| p).peekable();
+        kept = (0..points.len()).filter(|p| gone.next_if_eq(p).is_none()).collect();
+        let arrived = exchange(world, packed(points, &leaving))?;
+        let words = Points::<D>::record_words();
+        points.reserve(arrived.iter().map(|(_, list)| list.len() / words).sum());
+        for (_, list) in arrived {
+            list.chunks_exact(words).for_each(|record| points.unpack(record));
+        }
+        for p in cells.len()..points.len() {
+            // The sender located the same position with the same arithmetic.
+            let cell = grid.locate(&points.position[p]).ok_or_else(|| outside(points, p))?;
+            cells.push(cell);
+            kept.push(p);
+        }
+    }
+    sort_by_cell(points, &cells, (moved > 0).then_some(kept));
+    Ok(moved)
+}
+
+/// The points in cells of other ranks, ascending, with those ranks.
+fn leaving<const D: usize>(
+    world: &World,
+    partition: &Partition<D>,
+    grid: &Grid<D>,
+    cells: &[usize],
+) -> Vec<(usize, usize)> {
+    let mut leaving = Vec::new();
+    if world.size() == 1 {
+        return leaving;
+    }
     let here = world.rank();
-    let mut stay = Vec::with_capacity(points.len());
-    let mut outgoing: FxHashMap<usize, Vec<f64>> = FxHashMap::default();
     // Neighbours in memory mostly share their cell.
     let mut last = None;
     for (p, &cell) in cells.iter().enumerate() {
@@ -30,31 +62,29 @@ pub fn migrate<const D: usize>(
             _ => partition.owner_of_cell(grid, cell),
         };
         last = Some((cell, owner));
-        if owner == here {
-            stay.push(p);
-        } else {
-            points.pack(p, outgoing.entry(owner).or_default());
+        if owner != here {
+            leaving.push((p, owner));
         }
     }
-    let moved = world.sum_usize(points.len() - stay.len());
-    if moved > 0 {
-        if stay.len() < points.len() {
-            points.select(&stay);
-            cells = stay.iter().map(|&p| cells[p]).collect();
-        }
-        for (_, words) in exchange(world, outgoing.into_iter().collect())? {
-            for record in words.chunks_exact(Points::<D>::record_words()) {
-                points.unpack(record);
-            }
-        }
-        for p in cells.len()..points.len() {
-            // The sender located the same position with the same arithmetic.
-            let cell = grid.locate(&points.position[p]).ok_or_else(|| outside(points, p))?;
-            cells.push(cell);
+    leaving
+}
+
+/// The records of these points, a list for each rank.
+fn packed<const D: usize>(
+    points: &Points<D>,
+    leaving: &[(usize, usize)],
+) -> Vec<(usize, Vec<f64>)> {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    leaving.iter().for_each(|&(_, rank)| *counts.entry(rank).or_default() += 1);
+    let words = Points::<D>::record_words();
+    let mut lists: BTreeMap<usize, Vec<f64>> =
+        counts.into_iter().map(|(rank, count)| (rank, Vec::with_capacity(count * words))).collect();
+    for &(p, rank) in leaving {
+        if let Some(list) = lists.get_mut(&rank) {
+            points.pack(p, list);
         }
     }
-    sort_by_cell(points, &cells);
-    Ok(moved)
+    lists.into_iter().collect()
 }
 
 /// The cell of every point. Collective; the error names the first point outside the grid on the

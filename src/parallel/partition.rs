@@ -238,17 +238,8 @@ impl<const D: usize> Partition<D> {
         let mut table = Vec::new();
         let mut outcome = Ok(());
         if world.is_root() {
-            let mut all: Vec<UnitCost> = gathered.into_iter().flat_map(|(_, list)| list).collect();
-            // Stable: costs of one unit are added in the order of the ranks.
-            all.sort_by_key(|entry| entry.unit);
-            all.dedup_by(|entry, kept| {
-                let same = entry.unit == kept.unit;
-                if same {
-                    kept.cost += entry.cost;
-                }
-                same
-            });
-            match self.deal(&all, world.size()) {
+            let (all, holders) = joined(gathered);
+            match self.deal(&all, &holders, world.size()) {
                 Ok(owners) => table = owners,
                 Err(error) => outcome = Err(error),
             }
@@ -263,8 +254,9 @@ impl<const D: usize> Partition<D> {
         Ok(())
     }
 
-    /// The table of owners, from the costs of the populated units in ascending order.
-    fn deal(&self, load: &[UnitCost], ranks: usize) -> Result<Vec<u32>> {
+    /// The table of owners, from the costs of the populated units in ascending order and, for a
+    /// first partition, the ranks that hold most of them.
+    fn deal(&self, load: &[UnitCost], holders: &[u32], ranks: usize) -> Result<Vec<u32>> {
         let mut graph = Graph { offsets: vec![0], ..Graph::default() };
         let mut place = vec![NOBODY; self.unit_count()];
         for (k, entry) in load.iter().enumerate() {
@@ -281,7 +273,9 @@ impl<const D: usize> Partition<D> {
             graph.costs.push(entry.cost.max(f64::MIN_POSITIVE));
         }
         let mut part = metis::split(&graph, ranks)?;
-        if !self.owner.is_empty() && !load.is_empty() {
+        if self.owner.is_empty() {
+            relabel(&mut part, holders, &graph.costs, ranks);
+        } else if !load.is_empty() {
             let old: Vec<u32> = load.iter().map(|e| self.owner[e.unit as usize]).collect();
             relabel(&mut part, &old, &graph.costs, ranks);
             let mut near = old;
@@ -318,6 +312,35 @@ impl<const D: usize> Partition<D> {
         // No points at all, or parts of a mesh that hang together with none of them.
         owner.iter_mut().filter(|rank| **rank == NOBODY).for_each(|rank| *rank = 0);
     }
+}
+
+/// What the ranks (ascending) tell of their units: the costs added up, ascending by unit, and the
+/// rank that holds most of each.
+fn joined(gathered: Vec<(usize, Vec<UnitCost>)>) -> (Vec<UnitCost>, Vec<u32>) {
+    let mut all: Vec<(UnitCost, usize)> = gathered
+        .into_iter()
+        .flat_map(|(rank, list)| list.into_iter().map(move |entry| (entry, rank)))
+        .collect();
+    // Stable: costs of one unit are added in the order of the ranks.
+    all.sort_by_key(|(entry, _)| entry.unit);
+    let (mut load, mut holders): (Vec<UnitCost>, Vec<u32>) = Default::default();
+    let mut most = 0.0;
+    for (entry, rank) in all {
+        match (load.last_mut(), holders.last_mut()) {
+            (Some(sum), Some(holder)) if sum.unit == entry.unit => {
+                sum.cost += entry.cost;
+                if entry.cost > most {
+                    (most, *holder) = (entry.cost, rank as u32);
+                }
+            }
+            _ => {
+                load.push(entry);
+                holders.push(rank as u32);
+                most = entry.cost;
+            }
+        }
+    }
+    (load, holders)
 }
 
 fn largest_over_mean(costs: &[f64], part: &[u32], parts: usize) -> f64 {
@@ -376,10 +399,10 @@ mod tests {
         let partition = bricks([40, 30], 2);
         for ranks in [1, 2, 5, 9] {
             // The lowest three rows of bricks are populated.
-            let owner = partition.deal(&load(0..60), ranks).unwrap();
+            let owner = partition.deal(&load(0..60), &[0; 60], ranks).unwrap();
             assert_eq!(owner.len(), 20 * 15);
             assert!(owner.iter().all(|&rank| (rank as usize) < ranks));
-            assert_eq!(owner, partition.deal(&load(0..60), ranks).unwrap());
+            assert_eq!(owner, partition.deal(&load(0..60), &[0; 60], ranks).unwrap());
             // An empty brick takes an owner from the populated row below, one column aside at
             // most per row of distance.
             for unit in 60..300 {
@@ -393,10 +416,27 @@ mod tests {
     #[test]
     fn few_or_no_populated_units_leave_ranks_empty() {
         let partition = bricks([8, 8], 4);
-        assert_eq!(partition.deal(&load([]), 3).unwrap(), [0; 4]);
-        let owner = partition.deal(&load([1, 2]), 7).unwrap();
+        assert_eq!(partition.deal(&load([]), &[], 3).unwrap(), [0; 4]);
+        let owner = partition.deal(&load([1, 2]), &[0, 1], 7).unwrap();
         assert_eq!((owner[1], owner[2]), (0, 1));
         assert!(owner.iter().all(|&rank| rank < 2));
+    }
+
+    #[test]
+    fn a_first_partition_leaves_units_where_most_of_them_is() {
+        let partition = bricks([40, 40], 2);
+        let held = |unit: u64| if unit % 20 < 10 { 1 } else { 0 };
+        let of = |rank: u32| -> Vec<UnitCost> {
+            // A tenth of each unit lies on the other rank.
+            let share = |unit| if held(unit) == rank { 0.9 } else { 0.1 };
+            (0..400).map(|unit| UnitCost { unit, cost: share(unit) }).collect()
+        };
+        let (load, holders) = joined(vec![(0, of(0)), (1, of(1))]);
+        assert!(load.iter().zip(0..400).all(|(entry, k)| entry.unit == k && entry.cost == 1.0));
+        assert!(holders.iter().zip(0..400).all(|(&rank, unit)| rank == held(unit)));
+        let owner = partition.deal(&load, &holders, 2).unwrap();
+        let stay = owner.iter().zip(&holders).filter(|(owner, holder)| owner == holder).count();
+        assert!(stay >= 200, "{stay} of 400");
     }
 
     #[test]
@@ -406,8 +446,8 @@ mod tests {
         assert_eq!(part, [2, 2, 0, 0, 1, 1]);
         // One unit changes hands, not all.
         let mut partition = bricks([40, 40], 2);
-        partition.owner = partition.deal(&load(0..400), 4).unwrap();
-        let again = partition.deal(&load(0..400), 4).unwrap();
+        partition.owner = partition.deal(&load(0..400), &[0; 400], 4).unwrap();
+        let again = partition.deal(&load(0..400), &[], 4).unwrap();
         assert_eq!(again, partition.owner);
         // A part nobody held before takes a free name.
         let mut part = vec![1, 0, 2];

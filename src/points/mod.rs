@@ -3,15 +3,19 @@
 //! | file | idea |
 //! |---|---|
 //! | `mod.rs` | the fields, and how a point is packed, moved and reordered |
+//! | `gather.rs` | a field's values in another order |
 //! | `seed.rs` | deck bodies -> points |
 //! | `sort.rs` | points in the order of their cells |
 
 pub mod file;
+mod gather;
 pub mod seed;
 pub mod sort;
 
+use gather::Gather;
 use nalgebra::Matrix3;
 
+use crate::deck::model::Basis;
 use crate::grid::lattice::CORNER_SIGNS;
 
 /// Declares the struct of arrays and everything that must treat each field alike: packing for
@@ -27,6 +31,8 @@ macro_rules! point_fields {
             /// Index into the deck's bodies.
             pub body: Vec<u32>,
             $( $(#[$doc])* pub $name: Vec<$type>, )*
+            /// `corners` stays empty: a basis that reads none.
+            pub cornerless: bool,
         }
 
         impl<const D: usize> Points<D> {
@@ -42,7 +48,10 @@ macro_rules! point_fields {
             pub fn pack(&self, p: usize, out: &mut Vec<f64>) {
                 out.push(f64::from_bits(self.id[p]));
                 out.push(f64::from_bits(u64::from(self.body[p])));
-                $( self.$name[p].write_words(out); )*
+                $( match self.$name.get(p) {
+                    Some(value) => value.write_words(out),
+                    None => out.resize(out.len() + $words, 0.0),
+                } )*
             }
 
             /// Appends the point held in `words` (length [`Self::record_words`]).
@@ -50,20 +59,44 @@ macro_rules! point_fields {
                 self.id.push(words[0].to_bits());
                 self.body.push(words[1].to_bits() as u32);
                 let mut rest = &words[2..];
-                $( self.$name.push(<$type as Words>::read_words(&mut rest)); )*
+                $( let value = <$type as Words>::read_words(&mut rest);
+                if self.carries(stringify!($name)) {
+                    self.$name.push(value);
+                } )*
             }
 
             /// Keeps the points `order[0], order[1], ...` in that order and drops the others.
             pub fn select(&mut self, order: &[usize]) {
-                self.id = order.iter().map(|&p| self.id[p]).collect();
-                self.body = order.iter().map(|&p| self.body[p]).collect();
-                $( self.$name = order.iter().map(|&p| self.$name[p]).collect(); )*
+                let mut gather = Gather::new(order);
+                gather.apply(&mut self.id);
+                gather.apply(&mut self.body);
+                $( gather.apply(&mut self.$name); )*
+            }
+
+            /// Makes room for this many more points: by little where there is none, as an array
+            /// that doubles is copied and leaves a hole in the heap.
+            pub fn reserve(&mut self, more: usize) {
+                if self.id.capacity() - self.len() >= more {
+                    return;
+                }
+                let more = gather::with_slack(self.len() + more) - self.len();
+                self.id.reserve_exact(more);
+                self.body.reserve_exact(more);
+                $( if self.carries(stringify!($name)) {
+                    self.$name.reserve_exact(more);
+                } )*
             }
 
             /// Appends field `name` of point `p` to `out`; false if there is no such field.
             pub fn field_of(&self, name: &str, p: usize, out: &mut Vec<f64>) -> bool {
                 match name {
-                    $( stringify!($name) => { self.$name[p].write_words(out); true } )*
+                    $( stringify!($name) => {
+                        match self.$name.get(p) {
+                            Some(value) => value.write_words(out),
+                            None => out.resize(out.len() + $words, 0.0),
+                        }
+                        true
+                    } )*
                     _ => false,
                 }
             }
@@ -102,12 +135,30 @@ point_fields! {
     point_force: [f64; D], D;
     /// 1 for the outermost layer of the body's initial seeding, 0 inside
     outermost: f64, 1;
-    /// Corners of the CPDI2 domain (2D: 4, counter-clockwise; 3D: 8, hex8 order), m;
-    /// zero for the other bases
+    /// Corners of the CPDI2 domain (2D: 4, counter-clockwise; 3D: 8, hex8 order), m; with CPDI1
+    /// those at the start; none with the other bases
     corners: [[f64; D]; 8], 8 * D;
 }
 
 impl<const D: usize> Points<D> {
+    /// No points yet, of a basis that may read no corners: a quarter of a point's memory.
+    pub fn of_basis(basis: Basis) -> Self {
+        let cornerless = matches!(basis, Basis::Mpm | Basis::Gimp);
+        Points { cornerless, ..Points::default() }
+    }
+
+    /// Forgets what `basis` does not read.
+    pub fn shed(&mut self, basis: Basis) {
+        self.cornerless = Self::of_basis(basis).cornerless;
+        if self.cornerless {
+            self.corners = Vec::new();
+        }
+    }
+
+    fn carries(&self, field: &str) -> bool {
+        !(self.cornerless && field == "corners")
+    }
+
     pub fn len(&self) -> usize {
         self.id.len()
     }
@@ -148,7 +199,9 @@ impl<const D: usize> Points<D> {
         self.half_length_initial.push(half_length);
         self.point_force.push([0.0; D]);
         self.outermost.push(0.0);
-        self.corners.push(rectangle_corners(position, half_length));
+        if !self.cornerless {
+            self.corners.push(rectangle_corners(position, half_length));
+        }
     }
 }
 
@@ -208,5 +261,43 @@ impl Words for Matrix3<f64> {
         let value = Matrix3::from_column_slice(&words[..9]);
         *words = &words[9..];
         value
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_without_corners_travel_like_the_others() {
+        for basis in [Basis::Gimp, Basis::Cpdi2] {
+            let mut points = Points::<2>::of_basis(basis);
+            for k in 0..3 {
+                points.push_unstrained(k, 0, [k as f64, 0.0], 1.0, 2.0, [0.5; 2]);
+            }
+            let carried = if basis == Basis::Gimp { 0 } else { 3 };
+            assert_eq!(points.corners.len(), carried);
+            let mut record = Vec::new();
+            points.pack(1, &mut record);
+            assert_eq!(record.len(), Points::<2>::record_words());
+            let mut field = Vec::new();
+            assert!(points.field_of("corners", 2, &mut field));
+            assert_eq!(field.len(), 16);
+
+            let mut other = Points::<2>::of_basis(basis);
+            other.reserve(1);
+            other.unpack(&record);
+            points.select(&[2, 1]);
+            assert_eq!((other.position[0], points.position[1]), ([1.0, 0.0], [1.0, 0.0]));
+            assert_eq!(
+                (points.corners.len(), other.corners.len()),
+                (carried.min(2), carried.min(1))
+            );
+            if basis == Basis::Cpdi2 {
+                assert_eq!(points.corners[1], other.corners[0]);
+            }
+            points.shed(Basis::Mpm);
+            assert!(points.corners.is_empty());
+        }
     }
 }

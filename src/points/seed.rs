@@ -24,11 +24,90 @@ impl Share {
     pub fn of(&self, count: usize) -> Range<usize> {
         count * self.rank / self.ranks..count * (self.rank + 1) / self.ranks
     }
+
+    /// This rank's part of a box of `size` candidates: about as many inside the shape as on any
+    /// other rank, and in slices across the longest axis, as parts of the body will mostly be, so
+    /// that few points have to change rank. `inside` tells of a place in units of candidates.
+    fn of_box<const D: usize>(
+        &self,
+        size: [usize; D],
+        inside: impl Fn(&[f64; D]) -> bool,
+    ) -> Slice<D> {
+        let count: usize = size.iter().product();
+        let axis = (0..D).max_by_key(|&a| size[a]).unwrap_or(0);
+        if self.ranks == 1 || count == 0 {
+            return Slice { size, axis, range: 0..count };
+        }
+        // Points in the slices before each of these, by a coarse sample: on all ranks the same.
+        let mut before = vec![0.0];
+        let across = SAMPLES_ACROSS.pow(D as u32 - 1);
+        for slice in 0..SLICES {
+            let found = (0..across).filter(|&sample| {
+                let mut rest = sample;
+                inside(&std::array::from_fn(|a| {
+                    let at = if a == axis {
+                        (slice as f64 + 0.5) / SLICES as f64
+                    } else {
+                        let place = rest % SAMPLES_ACROSS;
+                        rest /= SAMPLES_ACROSS;
+                        (place as f64 + 0.5) / SAMPLES_ACROSS as f64
+                    };
+                    at * size[a] as f64
+                }))
+            });
+            // A body too thin for the samples is somewhere, too.
+            before.push(before[slice] + found.count() as f64 + 1e-3);
+        }
+        let start = |rank: usize| {
+            let goal = before[SLICES] * rank as f64 / self.ranks as f64;
+            let slice = before.partition_point(|&sum| sum <= goal).clamp(1, SLICES) - 1;
+            let part = (goal - before[slice]) / (before[slice + 1] - before[slice]);
+            let place = ((slice as f64 + part) / SLICES as f64 * count as f64) as usize;
+            if rank == self.ranks { count } else { place.min(count) }
+        };
+        Slice { size, axis, range: start(self.rank)..start(self.rank + 1) }
+    }
+}
+
+/// Slices of a sample of a shape, and samples along each axis of one of them.
+const SLICES: usize = 64;
+const SAMPLES_ACROSS: usize = 16;
+
+/// Candidates that follow each other where those along `axis` differ slowest.
+struct Slice<const D: usize> {
+    size: [usize; D],
+    axis: usize,
+    range: Range<usize>,
+}
+
+impl<const D: usize> Slice<D> {
+    /// Calls `visit` with number and index of each, in ascending order of the number, which counts
+    /// with the first axis fastest.
+    fn for_each(&self, mut visit: impl FnMut(usize, [usize; D])) {
+        let Slice { size, axis, range } = self;
+        let layer: usize = size.iter().product::<usize>() / size[*axis].max(1);
+        if range.is_empty() {
+            return;
+        }
+        let first = range.start / layer;
+        let mut within = *size;
+        within[*axis] = (range.end - 1) / layer + 1 - first;
+        for k in 0..within.iter().product() {
+            let mut at: [usize; D] = split(k, &within);
+            at[*axis] += first;
+            let number = (0..D).rev().fold(0, |flat, a| flat * size[a] + at[a]);
+            let others = (0..D).rev().filter(|a| a != axis);
+            let place = others.fold(at[*axis], |flat, a| flat * size[a] + at[a]);
+            if range.contains(&place) {
+                visit(number, at);
+            }
+        }
+    }
 }
 
 /// Makes this rank's share of all bodies' points, unstrained, with their initial velocity.
 pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result<Points<D>> {
-    let mut points = Points::default();
+    let mut points = Points::of_basis(deck.method.basis);
     let mut first_id = 0u64;
     // The position of a CPDI2 point is the centroid of its domain; others sit where their
     // sub-cell's centre maps to.
@@ -142,11 +221,13 @@ fn per_cell<const D: usize>(
 ) -> u64 {
     let (low, size) = cell_window(lattice, shape.bounds());
     let cells: usize = size.iter().product();
+    let at = |place: &[f64; D]| -> [f64; D] {
+        std::array::from_fn(|a| lattice.origin[a] + lattice.spacing[a] * (low[a] as f64 + place[a]))
+    };
     let per_cell: usize = counts.iter().product();
     let half: [f64; D] = std::array::from_fn(|a| 0.5 * lattice.spacing[a] / counts[a] as f64);
     let volume = half.iter().map(|l| 2.0 * l).product();
-    for candidate in share.of(cells) {
-        let cell: [usize; D] = split(candidate, &size);
+    share.of_box(size, |place| shape.contains(&at(place))).for_each(|candidate, cell| {
         for sub in 0..per_cell {
             let part: [usize; D] = split(sub, counts);
             let x: [f64; D] = std::array::from_fn(|a| {
@@ -160,7 +241,7 @@ fn per_cell<const D: usize>(
                 mark_outermost(points, |neighbour| shape.contains(neighbour), &x, &half);
             }
         }
-    }
+    });
     (cells * per_cell) as u64
 }
 
@@ -203,7 +284,9 @@ impl<const D: usize> CellSeeding<'_, D> {
                 let half = [0.5 * part.volume.powf(1.0 / D as f64); D];
                 let id = first_id + (candidate * per_cell + sub) as u64;
                 points.push_unstrained(id, index as u32, x, part.volume, body.density, half);
-                *points.corners.last_mut().expect("a point was just pushed") = part.corners;
+                if let Some(corners) = points.corners.last_mut() {
+                    *corners = part.corners;
+                }
             }
         }
         (self.cells.len() * per_cell) as u64
@@ -249,14 +332,18 @@ fn on_lattice<const D: usize>(
     };
     let low: [i64; D] =
         std::array::from_fn(|a| ((min[a] - offset[a]) / spacing).floor() as i64 - 1);
-    let size: Vec<usize> = (0..D)
-        .map(|a| (((max[a] - offset[a]) / spacing).ceil() as i64 + 2 - low[a]) as usize)
-        .collect();
-    let candidates = size.iter().product();
+    let size: [usize; D] = std::array::from_fn(|a| {
+        (((max[a] - offset[a]) / spacing).ceil() as i64 + 2 - low[a]) as usize
+    });
+    let candidates: usize = size.iter().product();
     let half = [0.5 * spacing; D];
     let volume = spacing.powi(D as i32);
-    for candidate in share.of(candidates) {
-        let at: [usize; D] = split(candidate, &size);
+    let inside = |place: &[f64; D]| {
+        let local: [f64; D] =
+            std::array::from_fn(|a| offset[a] + (low[a] as f64 + place[a]) * spacing);
+        shape.contains_local(&local)
+    };
+    share.of_box(size, inside).for_each(|candidate, at| {
         let local: [f64; D] =
             std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
         if shape.contains_local(&local) {
@@ -266,7 +353,7 @@ fn on_lattice<const D: usize>(
             points.push_unstrained(id, index as u32, x, volume, body.density, half);
             mark_outermost(points, |neighbour| shape.contains_local(neighbour), &local, &half);
         }
-    }
+    });
     Ok(candidates as u64)
 }
 
@@ -305,14 +392,14 @@ fn set_velocity<const D: usize>(points: &mut Points<D>, from: usize, body: &Body
 fn cell_window<const D: usize>(
     lattice: &Lattice<D>,
     bounds: Option<(Vec<f64>, Vec<f64>)>,
-) -> ([usize; D], Vec<usize>) {
-    let Some((min, max)) = bounds else { return ([0; D], lattice.cells.to_vec()) };
+) -> ([usize; D], [usize; D]) {
+    let Some((min, max)) = bounds else { return ([0; D], lattice.cells) };
     let clamp = |axis: usize, t: f64| (t.max(0.0) as usize).min(lattice.cells[axis]);
     let low: [usize; D] =
         std::array::from_fn(|a| clamp(a, lattice.scaled(a, min[a]).floor() - 1.0));
-    let size = (0..D)
-        .map(|a| clamp(a, lattice.scaled(a, max[a]).ceil() + 1.0).saturating_sub(low[a]))
-        .collect();
+    let size = std::array::from_fn(|a| {
+        clamp(a, lattice.scaled(a, max[a]).ceil() + 1.0).saturating_sub(low[a])
+    });
     (low, size)
 }
 
@@ -323,4 +410,37 @@ fn split<const D: usize>(mut flat: usize, counts: &[usize]) -> [usize; D] {
         flat /= counts[axis];
         i
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_are_about_equal_and_leave_nothing_out() {
+        // A quarter of an ellipse in a window with room to spare.
+        let inside = |x: &[f64; 2]| (x[0] / 80.0).powi(2) + (x[1] / 40.0).powi(2) <= 1.0;
+        let size = [90, 45];
+        for ranks in [1, 2, 7, 500] {
+            let (mut met, mut kept) = (vec![0; 90 * 45], Vec::new());
+            for rank in 0..ranks {
+                let (mut last, mut own) = (None, 0);
+                Share { rank, ranks }.of_box(size, inside).for_each(|number, at| {
+                    assert_eq!(number, at[0] + 90 * at[1]);
+                    assert!(last < Some(number));
+                    last = Some(number);
+                    met[number] += 1;
+                    own += usize::from(inside(&at.map(|i| i as f64 + 0.5)));
+                });
+                kept.push(own);
+            }
+            assert!(met.iter().all(|&times| times == 1), "{ranks} ranks");
+            let mean = kept.iter().sum::<usize>() as f64 / ranks as f64;
+            let largest = kept.iter().copied().fold(0, usize::max) as f64;
+            // Half a layer more or less, where a rank has less than one.
+            assert!(largest < 1.1 * mean + 10.0, "{ranks} ranks: {largest}, mean {mean}");
+        }
+        let empty = Share { rank: 1, ranks: 3 }.of_box([0, 4, 5], |_| true);
+        empty.for_each(|_, _| panic!("there is nothing"));
+    }
 }

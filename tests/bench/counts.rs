@@ -236,8 +236,9 @@ impl Numbers {
     }
 
     /// The phases of an explicit step with lumped mass, `usl` and `flip`, `domain_update =
-    /// "stretch"` with `gimp`: locate, assemble, update, migrate.
-    pub fn explicit(&self) -> [Count; 4] {
+    /// "stretch"` with `gimp`: locate, assemble, update, migrate (a step that sorts nothing), and
+    /// what is done between them.
+    pub fn explicit(&self) -> [Count; 5] {
         let d = self.axis();
         let basis = self.basis();
         let row = self.nodes * (8.0 + self.vector()) + 16.0;
@@ -280,8 +281,14 @@ impl Numbers {
                 &update,
                 self.nodes * (4.0 * d + 2.0 * d * d) + 2.0 * d + stress.iter().sum::<f64>() + 30.0,
             ),
-            // The cell of each point, and what is kept in case the step fails.
-            count("migrate", &[2.0 * (3.0 * TENSOR + 16.0 + 4.0 * self.vector()) + 64.0], 2.0 * d),
+            // cells found and kept; their order, with the points' identities
+            count("migrate", &[self.vector() + 8.0, 16.0], 2.0 * d),
+            // a copy in case the step fails; sums of energy, momentum and its moment
+            count(
+                "other",
+                &[2.0 * (3.0 * TENSOR + 16.0 + 4.0 * self.vector()), 8.0 + 2.0 * self.vector()],
+                5.0 * d + if self.dimension == 2 { 4.0 } else { 12.0 },
+            ),
         ]
     }
 }

@@ -2,21 +2,27 @@
 //! included, beside the machine's limits.
 //!
 //! `cargo bench --bench explicit [-- WORDS]`: the cases whose names hold one of the words;
-//! `-- ranks` (and words) compares two ranks with one, in wall time, and wants an idle machine.
+//! `-- ranks` (and words) compares two ranks with one, in wall time, and wants an idle machine;
+//! `-- limits` (and words) holds each phase of the lumped cases against the machine's limits.
 //!
 //! Each case runs twice, with few and with more steps; the difference of the processor times
 //! over the difference of the steps is what a step costs, free of set-up and output.
 
+mod counts;
 mod limits;
 mod report;
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
+use counts::Numbers;
+use limits::Machine;
 use report::machine;
 
 /// Counted pairs of runs of each case.
 const PAIRS: usize = 5;
+/// Runs of each length beside the limits.
+const RUNS: usize = 12;
 /// Steps of the short and of the long run.
 const SHORT: usize = 4;
 const LONG: usize = 16;
@@ -74,52 +80,25 @@ impl Case {
         )
     }
 
-    /// Bytes that a lumped step moves for one point, each array counted once per pass over it
-    /// (nodal arrays stay in the caches), and floating-point operations from the formulas, a
-    /// logarithm or an exponential as 20, a root or a division as one.
-    fn counted(&self) -> (f64, f64) {
-        let d = self.dimension as f64;
+    /// What the counts of a step are made from, at its start. Each axis of a cell holds one point
+    /// whose domain lies inside and one whose domain reaches into the next cell.
+    fn numbers(&self) -> Numbers {
+        let power = |base: f64| base.powi(self.dimension as i32);
+        let side = self.cells as f64;
         let gimp = self.basis == "gimp";
-        let nodes = if gimp { 2.5f64.powf(d) } else { 2f64.powf(d) };
-        let (tensor, plane, vector) = (72.0, 8.0 * d * d, 8.0 * d);
-        let row = nodes * (8.0 + vector) + 16.0;
-        let bytes = [
-            // kept in case the step fails; basis; groups; populated cells; weights of the nodes
-            2.0 * (tensor + vector),
-            vector * if gimp { 2.0 } else { 1.0 } + nodes * (16.0 + vector) + 8.0,
-            8.0 * nodes + 24.0,
-            vector + 4.0,
-            8.0 * nodes + 16.0,
-            // mass; momentum and force; rates and velocities; increments; their check
-            8.0 * nodes + 24.0,
-            row + tensor + vector + 16.0,
-            8.0 * nodes + 16.0 + 3.0 * vector,
-            row + plane + vector,
-            2.0 * vector + plane,
-            // F; domain; stress; position; ledger; migration
-            2.0 * tensor + plane,
-            tensor + 8.0 + vector * if gimp { 2.0 } else { 1.0 },
-            plane + 3.0 * tensor + 44.0,
-            3.0 * vector,
-            8.0 + 2.0 * vector,
-            vector + 56.0,
-        ];
-        let spectral = if d == 2.0 { 20.0 + 2.0 * 16.0 } else { 150.0 + 2.0 * 54.0 };
-        let plastic = if self.plastic { 45.0 + 60.0 } else { 0.0 };
-        let operations = [
-            // basis; momentum and force; rates and velocities; increments
-            if gimp { 20.0 * d } else { 4.0 * d } + nodes * (d * d - 1.0),
-            d + d * d + nodes * (2.0 * d + 2.0 * d * d),
-            nodes * 2.0 * d + 2.0 * d,
-            nodes * (2.0 * d * d + 2.0 * d),
-            // F; trial strain; principal axes, logarithms, stress; return; ledger
-            6.0 * d * d,
-            2.0 * d * d * d + d * d * (d + 1.0),
-            spectral + 60.0 + 25.0,
-            plastic,
-            30.0,
-        ];
-        (bytes.iter().sum(), operations.iter().sum())
+        let (nodes, groups, reach) =
+            if gimp { (power(2.5), 1.0, 1.0) } else { (power(2.0), power(0.5), 0.0) };
+        Numbers {
+            dimension: self.dimension,
+            gimp,
+            plastic: self.plastic,
+            nodes,
+            groups,
+            group_nodes: nodes * groups,
+            cells: power((side + reach) / (2.0 * side)),
+            active: power((side + reach + 1.0) / (2.0 * side)),
+            ..Numbers::default()
+        }
     }
 
     fn run(&self, folder: &Path, steps: usize, ranks: usize) -> Used {
@@ -215,19 +194,22 @@ fn cases() -> Vec<Case> {
     cases
 }
 
+/// The cases whose names hold one of the words; all without words.
+fn chosen(words: &[String]) -> impl Iterator<Item = Case> + '_ {
+    let named = |case: &Case| words.iter().any(|word| case.name().contains(word.as_str()));
+    cases().into_iter().filter(move |case| words.is_empty() || named(case))
+}
+
 fn main() {
     let words: Vec<String> =
         std::env::args().skip(1).filter(|word| !word.starts_with('-')).collect();
     let folder = tempfile::tempdir().expect("a scratch folder");
     println!("machine: {}", machine());
-    let triad = limits::triad();
-    let peaks = limits::peaks();
-    println!("triad bandwidth of one core: {triad:.1} GB/s");
-    for peak in &peaks {
-        println!("peak arithmetic, {}: {:.1} GFLOP/s", peak.name, peak.gflops);
-    }
-    if words.iter().any(|word| word == "ranks") {
-        return two_ranks(folder.path(), &words);
+    let limits = limits::measured();
+    match words.first().map(String::as_str) {
+        Some("ranks") => return two_ranks(folder.path(), &words[1..]),
+        Some("limits") => return beside_limits(folder.path(), &words[1..], &limits),
+        _ => {}
     }
     println!(
         "\nprocessor time, {PAIRS} runs of {LONG} steps less {PAIRS} of {SHORT}; shares of wall time\n\
@@ -236,21 +218,9 @@ fn main() {
     );
     println!("|---|---|---|---|{}---|---|", "---|".repeat(5));
     let mut costs: Vec<(String, f64)> = Vec::new();
-    for case in cases() {
+    for case in chosen(&words) {
         let name = case.name();
-        if !words.is_empty() && !words.iter().any(|word| name.contains(word.as_str())) {
-            continue;
-        }
         let cost = row(folder.path(), &case);
-        if case.mass == "lumped" {
-            let (bytes, operations) = case.counted();
-            println!(
-                "  counted: {bytes:.0} bytes = {:.0} ns at the triad, {operations:.0} operations = \
-                 {:.0} ns at the baseline peak",
-                bytes / triad,
-                operations / peaks[0].gflops
-            );
-        }
         if let Some((_, lumped)) =
             costs.iter().find(|(other, _)| *other == name.replace("consistent", "lumped"))
         {
@@ -293,6 +263,46 @@ fn row(folder: &Path, case: &Case) -> f64 {
     cost
 }
 
+/// Phase by phase: the least wall time of the steps beside what their bytes and operations need.
+fn beside_limits(folder: &Path, words: &[String], machine: &Machine) {
+    println!(
+        "\nper point and step; wall time: the least of {RUNS} runs of {LONG} steps less the least \
+         of {RUNS} of {SHORT}"
+    );
+    counts::print_head();
+    for case in chosen(words).filter(|case| case.mass == "lumped") {
+        let numbers = case.numbers();
+        // The five phases of the counts, then the whole.
+        let mut least = [[f64::MAX; 6]; 2];
+        for _ in 0..RUNS {
+            for (least, steps) in least.iter_mut().zip([SHORT, LONG]) {
+                let used = case.run(folder, steps, 1);
+                let [locate, assemble, solve, update, migrate, output] = used.phases;
+                let known = locate + assemble + solve + update + migrate + output;
+                let other = used.stepping - known;
+                let taken = [locate, assemble, update, migrate, other, used.stepping - output];
+                for (least, taken) in least.iter_mut().zip(taken) {
+                    *least = least.min(taken);
+                }
+            }
+        }
+        let steps = ((LONG - SHORT) * case.points()) as f64;
+        let ns = |k: usize| (least[1][k] - least[0][k]) / steps * 1e9;
+        let counts = numbers.explicit();
+        for (k, count) in counts.iter().enumerate() {
+            counts::print(&case.name(), count, ns(k), machine);
+        }
+        let sum = |of: fn(&counts::Count) -> f64| counts.iter().map(of).sum::<f64>();
+        let step = counts::Count {
+            phase: "step",
+            bytes: sum(|count| count.bytes),
+            operations: sum(|count| count.operations),
+            wide: false,
+        };
+        counts::print(&case.name(), &step, ns(5), machine);
+    }
+}
+
 /// Wall time of the steps on one rank over that on two, in turn, and twice that of one rank over
 /// that of two independent copies at once: the most that the machine allows.
 fn two_ranks(folder: &Path, words: &[String]) {
@@ -300,10 +310,9 @@ fn two_ranks(folder: &Path, words: &[String]) {
         "\n| case | one rank over two, wall: median (least to most) | two copies | of that |\n\
          |---|---|---|---|"
     );
-    let named = |case: &Case| words.iter().any(|word| case.name().contains(word.as_str()));
     let places = [folder.to_path_buf(), folder.join("copy")];
     std::fs::create_dir_all(&places[1]).expect("a folder for the copy");
-    for case in cases().into_iter().filter(|case| words.len() == 1 || named(case)) {
+    for case in chosen(words) {
         let cost = |folder: &Path, ranks: usize| {
             case.run(folder, LONG, ranks).stepping - case.run(folder, SHORT, ranks).stepping
         };
