@@ -14,7 +14,7 @@ use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
 
 /// Equations up to which the direct solver is the default in 2D and 3D, with Ghost stiffness.
-const DIRECT_STABILISED: [usize; 2] = [20_000, 6_000];
+const DIRECT_STABILISED: [usize; 2] = [10_000, 3_000];
 /// Without Ghost stiffness: 7 and 21 s for a factorisation, 1.8 and 1.6 GB.
 const DIRECT_UNSTABILISED: [usize; 2] = [400_000, 60_000];
 /// Up to here the direct solver runs on one rank.
