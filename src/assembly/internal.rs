@@ -7,8 +7,9 @@ use crate::error::Result;
 use crate::material::Material;
 use crate::mechanics::{self, Contribution, StepStart};
 use crate::points::Points;
+use crate::tensor::fused::{self, multiply_add};
 
-use super::kernel::{Batch, multiply_add};
+use super::kernel::Batch;
 use super::scatter::BlockRows;
 use super::{Numbering, Pattern};
 
@@ -71,7 +72,7 @@ pub fn assemble<const D: usize, R: BlockRows<D>>(
     debug_assert!(numbering.len() * D <= force.len());
     let task = Task { step, frame, pattern, displacement };
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+    if fused::has_avx2() {
         // SAFETY: the processor has just said that it knows the instructions.
         return Ok(unsafe { assemble_avx2(&task, force, stiffness) });
     }

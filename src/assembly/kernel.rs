@@ -3,6 +3,7 @@
 //! the sparse rows. The plain form is in `internal.rs`; a test compares the two.
 
 use crate::mechanics::Contribution;
+use crate::tensor::fused::multiply_add;
 
 use super::places::Place;
 use super::scatter::BlockRows;
@@ -281,12 +282,6 @@ pub(super) fn add_runs<const D: usize, const LENGTH: usize>(
 #[inline(always)]
 fn first<const N: usize>(values: &[f64]) -> &[f64; N] {
     values.first_chunk().expect("rows are filled up to whole tiles")
-}
-
-/// a b + c, rounded once where the instruction set can.
-#[inline(always)]
-pub(super) fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 fn grow(values: &mut Vec<f64>, length: usize) {

@@ -1,9 +1,9 @@
 //! Groups of nodes that become one node of the next level: around each root the nodes strongly
 //! coupled to it, then those two couplings away.
 //!
-//! Roots are a maximal set of nodes more than two strong couplings apart (Bell, Dalton and Olson,
-//! SIAM J. Sci. Comput. 34 (2012) C123): the node with the highest key among all within two
-//! couplings becomes one. Keys belong to nodes, so that the groups are the same on any number of
+//! Roots are a maximal set of nodes more than one or two strong couplings apart (Bell, Dalton and
+//! Olson, SIAM J. Sci. Comput. 34 (2012) C123): the node with the highest key among all within that
+//! distance becomes one. Keys belong to nodes, so that the groups are the same on any number of
 //! ranks.
 
 use crate::error::Result;
@@ -39,7 +39,7 @@ const OUT: f64 = 0.0;
 const ROOT: f64 = 2.0;
 
 impl Aggregates {
-    /// Collective.
+    /// Roots are more than `distance` strong couplings apart, one or two. Collective.
     pub fn find(world: &World, nodes: &Nodes, strong: &Strong, distance: usize) -> Result<Self> {
         let state = roots(world, nodes, strong, distance)?;
         let roots: Vec<u32> =
@@ -51,7 +51,7 @@ impl Aggregates {
             group[root as usize] = Some(Group { number: (first + k) as i32, key, root: position });
         }
         let mut aggregates = Aggregates { group, roots, first, total };
-        // No node is within one coupling of two roots; within two it has to choose.
+        // Next to several roots, or two couplings away from them, a node has to choose.
         for _ in 0..2 {
             aggregates.share(world, nodes)?;
             aggregates.grow(nodes.owned, strong);

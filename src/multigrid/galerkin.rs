@@ -2,10 +2,11 @@
 
 use crate::error::Result;
 use crate::parallel::{HaloPlan, World, exchange};
+use crate::tensor::fused::{self, Block, add_product, add_transposed_product};
 
 use super::aggregate::Aggregates;
 use super::level::{BlockRows, Nodes, Rows};
-use super::prolongator::{Prolongator, add_product, multiply_add};
+use super::prolongator::Prolongator;
 
 /// The next level.
 pub struct Coarse<const C: usize> {
@@ -52,12 +53,12 @@ impl Seen {
 struct Sums<const C: usize> {
     /// Per row: columns, ascending, and where their blocks are.
     rows: Vec<Vec<(u32, u32)>>,
-    blocks: Vec<[[f64; C]; C]>,
+    blocks: Vec<Block<C, C>>,
 }
 
 impl<const C: usize> Sums<C> {
     #[inline(always)]
-    fn block(&mut self, row: usize, column: u32) -> &mut [[f64; C]; C] {
+    fn block(&mut self, row: usize, column: u32) -> &mut Block<C, C> {
         let entries = &mut self.rows[row];
         let place = match entries.binary_search_by_key(&column, |entry| entry.0) {
             Ok(place) => entries[place].1,
@@ -125,7 +126,7 @@ fn multiply<const K: usize, const C: usize>(
     sums: &mut Sums<C>,
 ) {
     #[cfg(target_arch = "x86_64")]
-    if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+    if fused::has_avx2() {
         // SAFETY: the processor has just said that it knows the instructions.
         return unsafe { multiply_avx2(owned, rows, prolongator, seen, sums) };
     }
@@ -156,7 +157,7 @@ fn multiply_in<const K: usize, const C: usize, const FUSED: bool>(
     let places: Vec<u32> =
         prolongator.columns.iter().map(|&number| seen.place(number) as u32).collect();
     let mut slot = vec![NONE; seen.len()];
-    let (mut columns, mut products): (Vec<u32>, Vec<[[f64; C]; K]>) = (Vec::new(), Vec::new());
+    let (mut columns, mut products): (Vec<u32>, Vec<Block<K, C>>) = (Vec::new(), Vec::new());
     for row in 0..owned {
         let range = prolongator.offsets[row]..prolongator.offsets[row + 1];
         if range.is_empty() {
@@ -177,7 +178,7 @@ fn multiply_in<const K: usize, const C: usize, const FUSED: bool>(
         });
         for (&place, left) in places[range.clone()].iter().zip(&prolongator.values[range]) {
             for (&column, right) in columns.iter().zip(&products) {
-                add_transposed_product::<K, C, FUSED>(
+                add_transposed_product::<K, C, C, FUSED>(
                     sums.block(place as usize, column),
                     left,
                     right,
@@ -187,22 +188,6 @@ fn multiply_in<const K: usize, const C: usize, const FUSED: bool>(
         columns.iter().for_each(|&place| slot[place as usize] = NONE);
         columns.clear();
         products.clear();
-    }
-}
-
-/// sum += a^T b.
-#[inline(always)]
-fn add_transposed_product<const K: usize, const C: usize, const FUSED: bool>(
-    sum: &mut [[f64; C]; C],
-    a: &[[f64; C]; K],
-    b: &[[f64; C]; K],
-) {
-    for r in 0..C {
-        for k in 0..K {
-            for c in 0..C {
-                sum[r][c] = multiply_add::<FUSED>(a[k][r], b[k][c], sum[r][c]);
-            }
-        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::assembly::{Numbering, Pattern};
 use crate::parallel::HaloPlan;
+use crate::tensor::fused::Block;
 
 /// The nodes of a level: owned ones first, then ghosts, ascending by global number.
 #[derive(Debug, Default)]
@@ -35,7 +36,7 @@ pub trait Rows<const K: usize> {
     fn columns(&self, row: usize) -> &[u32];
 
     /// Shows each column of a row with its block.
-    fn visit(&self, row: usize, see: impl FnMut(usize, &[[f64; K]; K]));
+    fn visit(&self, row: usize, see: impl FnMut(usize, &Block<K, K>));
 }
 
 /// Rows with values of their own.
@@ -43,7 +44,7 @@ pub trait Rows<const K: usize> {
 pub struct BlockRows<const K: usize> {
     pub offsets: Vec<usize>,
     pub columns: Vec<u32>,
-    pub values: Vec<[[f64; K]; K]>,
+    pub values: Vec<Block<K, K>>,
 }
 
 impl<const K: usize> Rows<K> for BlockRows<K> {
@@ -53,7 +54,7 @@ impl<const K: usize> Rows<K> for BlockRows<K> {
     }
 
     #[inline(always)]
-    fn visit(&self, row: usize, mut see: impl FnMut(usize, &[[f64; K]; K])) {
+    fn visit(&self, row: usize, mut see: impl FnMut(usize, &Block<K, K>)) {
         let range = self.offsets[row]..self.offsets[row + 1];
         for (&column, block) in self.columns[range.clone()].iter().zip(&self.values[range]) {
             see(column as usize, block);
@@ -100,7 +101,7 @@ impl<const K: usize> Rows<K> for Assembled<'_> {
     }
 
     #[inline(always)]
-    fn visit(&self, row: usize, mut see: impl FnMut(usize, &[[f64; K]; K])) {
+    fn visit(&self, row: usize, mut see: impl FnMut(usize, &Block<K, K>)) {
         let (start, end) = (self.before[row], self.before[row + 1]);
         let width = [0, 1].map(|k| (end[k] - start[k]) * K);
         let mut next = [0, 1].map(|k| start[k] * K * K);

@@ -38,13 +38,25 @@ use strength::Strong;
 
 /// Degrees of freedom that are few enough to be solved directly.
 const COARSEST: usize = 600;
-/// A level with a larger share of the finer one's nodes is not worth having.
-const LEAST_GAIN: f64 = 0.8;
 const MOST_LEVELS: usize = 12;
 /// Couplings below this share are weak.
 const THRESHOLD: f64 = 0.03;
 /// Of the prolongator's smoothing, over the largest eigenvalue.
 const DAMPING: f64 = 1.5;
+
+/// How a level is coarsened.
+#[derive(Debug, Clone, Copy)]
+struct Coarsening {
+    /// Strong couplings between two roots, at least one more than these.
+    distance: usize,
+    /// A next level with a larger share of the nodes is not worth having.
+    most_left: f64,
+}
+
+/// A second ring around the roots costs a few iterations, and halves a set-up that is dear on the
+/// finest level alone.
+const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
+const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
 /// The hierarchy under an assembled system of displacements. Collective.
 pub fn of_system<const D: usize>(
@@ -91,13 +103,13 @@ pub fn build<const K: usize, const C: usize>(
     let mut rounded = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count);
     exact.round_into(&mut rounded);
     let mut levels = Vec::new();
-    let first = coarsen::<K, C>(world, nodes, rows, rounded, 1.0, 1.0, 2)?;
+    let first = coarsen::<K, C>(world, nodes, rows, rounded, 1.0, FINEST)?;
     let Some((level, mut coarse, mut length)) = first else { return Ok(None) };
     levels.push(level);
     while levels.len() < MOST_LEVELS && world.sum_usize(coarse.nodes.owned) * C > COARSEST {
         let (nodes, rows) = (&coarse.nodes, &coarse.rows);
         let product = product(nodes, rows);
-        let next = coarsen::<C, C>(world, nodes, rows, product, length, LEAST_GAIN, 1)?;
+        let next = coarsen::<C, C>(world, nodes, rows, product, length, COARSER)?;
         let Some((level, coarser, coarser_length)) = next else { break };
         levels.push(level);
         (coarse, length) = (coarser, coarser_length);
@@ -105,21 +117,20 @@ pub fn build<const K: usize, const C: usize>(
     Ok(Some(Hierarchy { exact, levels, coarsest: coarsest(&coarse) }))
 }
 
-/// One level, the next, and the latter's length of rotations (m). `None` where the next has more than
-/// `gain` of this one's nodes, or none.
+/// One level, the next, and the latter's length of rotations (m). `None` where the next has too many
+/// nodes to be worth having, or none.
 fn coarsen<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,
     rows: &impl Rows<K>,
     product: BlockProduct<f32>,
     length: f64,
-    gain: f64,
-    distance: usize,
+    how: Coarsening,
 ) -> Result<Option<(Smoothed, Coarse<C>, f64)>> {
     let strong = Strong::of(world, nodes, rows, THRESHOLD)?;
-    let aggregates = Aggregates::find(world, nodes, &strong, distance)?;
+    let aggregates = Aggregates::find(world, nodes, &strong, how.distance)?;
     let all = world.sum_usize(nodes.owned);
-    if aggregates.total == 0 || aggregates.total as f64 > gain * all as f64 {
+    if aggregates.total == 0 || aggregates.total as f64 > how.most_left * all as f64 {
         return Ok(None);
     }
     let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };

@@ -1,8 +1,9 @@
 //! P = (I - omega D^-1 A) T: motions of the coarse nodes, smoothed once, so that their energy is low
-//! (Vanek, Mandel and Brezina 1996), with omega = 4 / (3 lambda_max(D^-1 A)).
+//! (Vanek, Mandel and Brezina 1996), with omega = 1.5 / lambda_max(D^-1 A).
 
 use crate::error::Result;
 use crate::parallel::{World, exchange};
+use crate::tensor::fused::{self, Block, add_product};
 
 use super::aggregate::{Aggregates, Group};
 use super::level::{Nodes, Rows};
@@ -14,7 +15,7 @@ pub struct Prolongator<const K: usize, const C: usize> {
     pub offsets: Vec<usize>,
     /// Global numbers of coarse nodes.
     pub columns: Vec<i32>,
-    pub values: Vec<[[f64; C]; K]>,
+    pub values: Vec<Block<K, C>>,
 }
 
 /// Rotations count in one over these lengths (m): of the nodes of this level, and of the next.
@@ -60,7 +61,7 @@ impl Parts<'_> {
         node: usize,
         group: &Group,
         free: &[f64],
-    ) -> [[f64; C]; K] {
+    ) -> Block<K, C> {
         let offset = offset(self.nodes.position[node], group.root);
         let ratio = self.lengths.fine / self.lengths.coarse;
         let mut motion = rigid::carried(offset, self.lengths.coarse, ratio);
@@ -85,7 +86,7 @@ impl<const K: usize, const C: usize> Prolongator<K, C> {
     /// The owned rows.
     fn smooth(&mut self, rows: &impl Rows<K>, parts: &Parts, free: &[f64]) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if fused::has_avx2() {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { self.smooth_avx2(rows, parts, free) };
         }
@@ -169,31 +170,10 @@ impl<const K: usize, const C: usize> Prolongator<K, C> {
 
     /// Columns and blocks of a local node.
     #[inline(always)]
-    pub fn row(&self, node: usize) -> (&[i32], &[[[f64; C]; K]]) {
+    pub fn row(&self, node: usize) -> (&[i32], &[Block<K, C>]) {
         let range = self.offsets[node]..self.offsets[node + 1];
         (&self.columns[range.clone()], &self.values[range])
     }
-}
-
-/// sum += a b, each term rounded once where the instruction set can (`FUSED`).
-#[inline(always)]
-pub fn add_product<const K: usize, const M: usize, const C: usize, const FUSED: bool>(
-    sum: &mut [[f64; C]; K],
-    a: &[[f64; M]; K],
-    b: &[[f64; C]; M],
-) {
-    for r in 0..K {
-        for m in 0..M {
-            for c in 0..C {
-                sum[r][c] = multiply_add::<FUSED>(a[r][m], b[m][c], sum[r][c]);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-pub fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
 /// 1 for a degree of freedom that is coupled to others, 0 for one that is held: it does not take

@@ -2,6 +2,8 @@
 //! that smoothed aggregation has to keep. A node of a coarser level has three degrees of freedom in
 //! the plane and six in space.
 
+use crate::tensor::fused::Block;
+
 /// What a motion of the coarse node does to a node at `offset` (m) from its root: u = t + w x r, with
 /// rotations in units of one over `length`. `ratio`: that length of the finer level over this one's,
 /// for nodes that rotate themselves.
@@ -9,7 +11,7 @@ pub fn carried<const K: usize, const C: usize>(
     offset: [f64; 3],
     length: f64,
     ratio: f64,
-) -> [[f64; C]; K] {
+) -> Block<K, C> {
     let [x, y, z] = offset.map(|value| value / length);
     let mut motion = [[0.0; C]; K];
     let dimension = if C == 3 { 2 } else { 3 };

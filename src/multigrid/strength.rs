@@ -3,6 +3,7 @@
 
 use crate::error::Result;
 use crate::parallel::World;
+use crate::tensor::fused::Block;
 
 use super::level::{Nodes, Rows};
 
@@ -21,7 +22,7 @@ impl Strong {
         rows: &impl Rows<K>,
         threshold: f64,
     ) -> Result<Self> {
-        let square = |block: &[[f64; K]; K]| -> f64 { block.iter().flatten().map(|v| v * v).sum() };
+        let square = |block: &Block<K, K>| -> f64 { block.iter().flatten().map(|v| v * v).sum() };
         let mut scale = vec![0.0; nodes.local()];
         for row in 0..nodes.owned {
             rows.visit(row, |column, block| {

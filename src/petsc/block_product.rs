@@ -16,6 +16,7 @@ use super::stored::Stored;
 use super::sys;
 use super::vector::{Values, ValuesMut, index};
 use crate::error::{Error, Result};
+use crate::tensor::fused::Block;
 
 /// The rows of one rank, their values kept as `T`.
 #[derive(Debug, Clone)]
@@ -39,7 +40,7 @@ enum Own<T> {
 
 /// Blocks of one row, each with its column: below the number of own ones one of this rank, from
 /// there on one of the ghosts.
-pub type Row<const R: usize, const C: usize> = Vec<(usize, [[f64; C]; R])>;
+pub type Row<const R: usize, const C: usize> = Vec<(usize, Block<R, C>)>;
 
 impl<T: Stored> BlockProduct<T> {
     /// `rows` block rows of `R` x `C` blocks; `row` appends those of one to the list it is given.

@@ -2,7 +2,8 @@
 //! double precision: 4 or 8 bytes an entry and 4 a block, where compressed rows take 12 an entry. Sums
 //! are in double precision. Of a symmetric matrix [`super::Half`] takes half of that.
 
-use super::stored::{AHEAD, BEYOND, Stored, fetch, multiply_add};
+use super::stored::{AHEAD, BEYOND, Stored, fetch};
+use crate::tensor::fused::{self, multiply_add};
 
 /// The rows of one rank, or the part of them that multiplies other ranks' unknowns.
 #[derive(Debug, Clone)]
@@ -92,7 +93,7 @@ impl<T: Stored> Blocks<T> {
     /// y = A x or y += A x, in the fastest form that the processor knows.
     fn run<const ADD: bool>(&self, x: &[f64], y: &mut [f64]) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if fused::has_avx2() {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { avx2::run::<T, ADD>(self, x, y) };
         }
@@ -135,7 +136,7 @@ impl<T: Stored> Blocks<T> {
     pub fn multiply_transposed(&self, x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if fused::has_avx2() {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { avx2::transposed(self, x, y) };
         }
@@ -194,7 +195,7 @@ pub struct Growing<T> {
 
 impl<T: Stored> Growing<T> {
     /// Appends a row of `R` x `C` blocks, each with its column.
-    pub fn push<const R: usize, const C: usize>(&mut self, row: &[(usize, [[f64; C]; R])]) {
+    pub fn push<const R: usize, const C: usize>(&mut self, row: &[(usize, fused::Block<R, C>)]) {
         match self.blocks.shape {
             Shape::Two => self.push_in::<R, C, 2, 2, 4>(row),
             Shape::Three => self.push_in::<R, C, 3, 3, 9>(row),
@@ -206,7 +207,7 @@ impl<T: Stored> Growing<T> {
     #[inline(always)]
     fn push_in<const R: usize, const C: usize, const H: usize, const W: usize, const N: usize>(
         &mut self,
-        row: &[(usize, [[f64; C]; R])],
+        row: &[(usize, fused::Block<R, C>)],
     ) {
         for first in (0..R).step_by(H) {
             for (column, block) in row {

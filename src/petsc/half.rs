@@ -5,7 +5,8 @@
 //! by rows: then the second is a sum of rows, and the first one product per lane, added up once at
 //! the end of the row of blocks.
 
-use super::stored::{AHEAD, BEYOND, Stored, fetch, multiply_add};
+use super::stored::{AHEAD, BEYOND, Stored, fetch};
+use crate::tensor::fused::{self, multiply_add};
 
 /// A square symmetric matrix, all its columns those of its rows.
 #[derive(Debug, Clone)]
@@ -62,7 +63,7 @@ impl<T: Stored> Half<T> {
 
     /// Appends a row of `K` x `K` blocks, each with its column; those right of the diagonal are
     /// left out: of each pair of mirrored entries the lower one counts.
-    pub fn push<const K: usize>(&mut self, row: &[(usize, [[f64; K]; K])]) {
+    pub fn push<const K: usize>(&mut self, row: &[(usize, fused::Block<K, K>)]) {
         match self.shape {
             Shape::Two => self.push_in::<K, 2, 4>(row),
             Shape::Three => self.push_in::<K, 3, 9>(row),
@@ -73,7 +74,7 @@ impl<T: Stored> Half<T> {
     #[inline(always)]
     fn push_in<const K: usize, const N: usize, const NN: usize>(
         &mut self,
-        row: &[(usize, [[f64; K]; K])],
+        row: &[(usize, fused::Block<K, K>)],
     ) {
         self.values.truncate(self.blocks() * NN);
         let part = K / N;
@@ -139,7 +140,7 @@ impl<T: Stored> Half<T> {
     /// y = A x or y += A x, in the fastest form that the processor knows.
     fn run<const ADD: bool>(&self, x: &[f64], y: &mut [f64]) {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma") {
+        if fused::has_avx2() {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { avx2::run::<T, ADD>(self, x, y) };
         }

@@ -27,12 +27,6 @@ pub(super) const BEYOND: usize = 1;
 /// processor to foresee the next ones.
 pub(super) const AHEAD: usize = 8192;
 
-/// a b + c, rounded once where the instruction set can.
-#[inline(always)]
-pub(super) fn multiply_add<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
-    if FUSED { a.mul_add(b, c) } else { a * b + c }
-}
-
 /// Asks for what lies `ahead` bytes further on.
 #[inline(always)]
 pub(super) fn fetch<T>(here: *const T, ahead: usize) {
