@@ -218,8 +218,7 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
     let grid = &model.grid;
     let mut problem =
         Equilibrium::new(world, grid, &mesh, step, &conditions, &left_out, external, settings)?;
-    let values = vec![0.0; pattern.ghost_start * D * D];
-    let mut matrix = solver::matrix(world, &model.grid, numbering, pattern, &values)?;
+    let mut matrix = solver::matrix(world, &model.grid, numbering, pattern)?;
     let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);
     x.values_mut()?.copy_from_slice(&probe[..owned]);
     let iterate = &displacement[..owned];

@@ -60,10 +60,8 @@ pub fn solve<const D: usize>(
     number: usize,
 ) -> Result<std::result::Result<Converged, String>> {
     let numbering = &mesh.numbering;
-    let mut matrix = clock.time(Phase::Assemble, || {
-        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
-        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
-    })?;
+    let mut matrix = clock
+        .time(Phase::Assemble, || solver::matrix(world, &model.grid, numbering, &mesh.pattern))?;
     let mut solution = matrix.vector()?;
     let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
     let stabilised = model.penalties.iter().all(|penalty| penalty.stiffness > 0.0);

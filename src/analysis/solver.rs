@@ -114,17 +114,16 @@ pub fn newton(
     Ok(snes)
 }
 
-/// The system's matrix with the given values, block size and near-null space. Collective.
+/// The system's matrix, still zero, with its block size and near-null space. Collective.
 pub fn matrix<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     numbering: &Numbering,
     pattern: &Pattern,
-    values: &[f64],
 ) -> Result<Matrix> {
     let rows = numbering.owned * D;
     let mut offsets = Vec::with_capacity(rows + 1);
-    let mut columns = Vec::with_capacity(values.len());
+    let mut columns = Vec::with_capacity(pattern.ghost_start * D * D);
     offsets.push(0);
     for row in 0..numbering.owned {
         let nodes = &pattern.columns[pattern.offsets[row]..pattern.offsets[row + 1]];
@@ -136,7 +135,7 @@ pub fn matrix<const D: usize>(
             offsets.push(columns.len() as i32);
         }
     }
-    let mut matrix = Matrix::from_csr(world.comm(), D, rows, &offsets, &columns, values)?;
+    let mut matrix = Matrix::zeros(world.comm(), D, rows, &offsets, &columns)?;
     matrix.set_symmetric(true)?;
     let coordinates: Vec<f64> = numbering.nodes[..numbering.owned]
         .iter()

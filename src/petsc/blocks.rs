@@ -263,7 +263,7 @@ mod avx2 {
         match blocks.shape {
             Shape::Two => twos::<T, ADD>(blocks, x, y),
             Shape::Three => threes::<T, ADD>(blocks, x, y),
-            Shape::TwoByThree => blocks.plain::<2, 3, ADD, true>(x, y),
+            Shape::TwoByThree => twos_by_three::<T, ADD>(blocks, x, y),
         }
     }
 
@@ -302,6 +302,34 @@ mod avx2 {
             let mut sums = [0.0; 2];
             // SAFETY: two values fit.
             unsafe { _mm_storeu_pd(sums.as_mut_ptr(), _mm_hadd_pd(low, high)) };
+            store::<2, ADD>(&mut y[blocks.row(k)], sums);
+        }
+    }
+
+    /// A block is two columns in one vector, and the third.
+    #[target_feature(enable = "avx2,fma")]
+    fn twos_by_three<T: Stored, const ADD: bool>(blocks: &Blocks<T>, x: &[f64], y: &mut [f64]) {
+        let (x, y) = (x.as_chunks::<3>().0, y.as_chunks_mut::<2>().0);
+        for (k, range) in blocks.offsets.windows(2).enumerate() {
+            let row = range[0] as usize..range[1] as usize;
+            let values = &blocks.values[6 * row.start..6 * row.end + BEYOND];
+            let columns = &blocks.columns[row];
+            let (mut sums, mut last) = (_mm256_setzero_pd(), _mm256_setzero_pd());
+            for (&column, block) in columns.iter().zip(values.windows(6 + BEYOND).step_by(6)) {
+                fetch(block.as_ptr(), AHEAD);
+                let x = &x[column as usize];
+                // SAFETY: seven values are there. Of the second vector the first column is used,
+                // and dropped, once more: then it ends with the block.
+                let (first, third) = unsafe { (load(block.as_ptr()), load(block.as_ptr().add(2))) };
+                let pair = _mm256_set_pd(x[1], x[1], x[0], x[0]);
+                sums = _mm256_fmadd_pd(first, pair, sums);
+                last = _mm256_fmadd_pd(third, _mm256_set1_pd(x[2]), last);
+            }
+            let sum = _mm256_add_pd(sums, _mm256_permute2f128_pd::<0x01>(sums, sums));
+            let sum = _mm_add_pd(_mm256_castpd256_pd128(sum), _mm256_extractf128_pd::<1>(last));
+            let mut sums = [0.0; 2];
+            // SAFETY: two values fit.
+            unsafe { _mm_storeu_pd(sums.as_mut_ptr(), sum) };
             store::<2, ADD>(&mut y[blocks.row(k)], sums);
         }
     }

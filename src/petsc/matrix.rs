@@ -49,6 +49,21 @@ impl Matrix {
         columns: &[i32],
         values: &[f64],
     ) -> Result<Self> {
+        let given = check_values(columns, values);
+        agree(comm, given)?;
+        let mut matrix = Self::zeros(comm, block_size, rows_local, row_offsets, columns)?;
+        matrix.update(values)?;
+        Ok(matrix)
+    }
+
+    /// [`Self::from_csr`] with values that are all zero.
+    pub fn zeros(
+        comm: &SimpleCommunicator,
+        block_size: usize,
+        rows_local: usize,
+        row_offsets: &[i32],
+        columns: &[i32],
+    ) -> Result<Self> {
         require_running()?;
         let mut below = 0u64;
         let mut all = 0u64;
@@ -61,7 +76,7 @@ impl Matrix {
             comm,
             index(all as usize)
                 .map(drop)
-                .and_then(|()| check_rows(block_size, &own, all, row_offsets, columns, values)),
+                .and_then(|()| check_rows(block_size, &own, all, row_offsets, columns)),
         )?;
 
         let (n, block) = (index(rows_local)?, index(block_size)?);
@@ -83,7 +98,12 @@ impl Matrix {
         // With these two the later assemblies need no communication.
         petsc!(MatSetOption(matrix.raw, sys::MAT_NO_OFF_PROC_ENTRIES, sys::PETSC_TRUE))?;
         petsc!(MatSetOption(matrix.raw, sys::MAT_NEW_NONZERO_LOCATIONS, sys::PETSC_FALSE))?;
-        matrix.update(values)?;
+        {
+            let (mut inside, outside) = matrix.storage()?;
+            inside.fill(0.0);
+            outside.into_iter().for_each(|mut outside| outside.fill(0.0));
+        }
+        matrix.changed()?;
         matrix.check_split()?;
         Ok(matrix)
     }
@@ -333,13 +353,23 @@ fn stored(matrix: sys::Mat) -> Result<usize> {
     Ok(unsafe { info.assume_init() }.nz_used as usize)
 }
 
+fn check_values(columns: &[i32], values: &[f64]) -> Result<()> {
+    if values.len() == columns.len() {
+        return Ok(());
+    }
+    Err(Error::Environment(format!(
+        "matrix pattern: {} columns, but {} values",
+        columns.len(),
+        values.len()
+    )))
+}
+
 fn check_rows(
     block_size: usize,
     own: &std::ops::Range<usize>,
     rows_global: u64,
     row_offsets: &[i32],
     columns: &[i32],
-    values: &[f64],
 ) -> Result<()> {
     let fail = |what: String| Err(Error::Environment(format!("matrix pattern: {what}")));
     let rows = own.len();
@@ -349,12 +379,11 @@ fn check_rows(
     if row_offsets.len() != rows + 1 || row_offsets[0] != 0 {
         return fail(format!("{} row offsets for {rows} rows, from 0", row_offsets.len()));
     }
-    if row_offsets[rows] as usize != columns.len() || values.len() != columns.len() {
+    if row_offsets[rows] as usize != columns.len() {
         return fail(format!(
-            "offsets end at {}, but there are {} columns and {} values",
+            "offsets end at {}, but there are {} columns",
             row_offsets[rows],
-            columns.len(),
-            values.len()
+            columns.len()
         ));
     }
     for (r, row) in row_offsets.windows(2).enumerate() {
@@ -381,8 +410,7 @@ mod tests {
     #[test]
     fn wrong_patterns_are_named() {
         let text = |offsets: &[i32], columns: &[i32]| {
-            check_rows(1, &(4..6), 8, offsets, columns, &vec![0.0; columns.len()])
-                .map_err(|e| e.to_string())
+            check_rows(1, &(4..6), 8, offsets, columns).map_err(|e| e.to_string())
         };
         assert!(text(&[0, 2, 3], &[1, 7, 0]).is_ok());
         assert!(text(&[0, 2, 3], &[7, 1, 0]).unwrap_err().contains("row 4"));

@@ -347,10 +347,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     };
     let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
     let owned = numbering.owned * D;
-    let empty = || {
-        let values = vec![0.0; mesh.pattern.ghost_start * D * D];
-        solver::matrix(world, &model.grid, numbering, &mesh.pattern, &values)
-    };
+    let empty = || solver::matrix(world, &model.grid, numbering, &mesh.pattern);
     let equations = || {
         let external = vec![0.0; owned];
         let grid = &model.grid;

@@ -129,10 +129,10 @@ fn beam() {
     );
 }
 
-/// `inputs/doughnut-10.toml` on a finer mesh: 184 000 points, multigrid on any number of ranks.
+/// `inputs/doughnut-10.toml` on a finer mesh: 205 000 points, multigrid on any number of ranks.
 const MESH: [&str; 6] = [
     "grid.generate.annulus.radial=80",
-    "grid.generate.annulus.around=576",
+    "grid.generate.annulus.around=640",
     "analysis.steps=4",
     "petsc.qs_ksp_type=\"cg\"",
     "petsc.qs_ksp_rtol=1e-8",
