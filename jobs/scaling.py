@@ -306,7 +306,7 @@ def report(kind, rows):
 # Assumed of a large machine: s per message, bytes per s and rank, s per reduction and doubling.
 LATENCY, BANDWIDTH, REDUCTION = 2e-6, 1e9, 2e-6
 # Processor seconds per point and step of this deck on one rank (docs/scaling.md).
-PER_POINT = 7e-6
+PER_POINT = 3.1e-6
 
 
 def model(weak, sizes):
@@ -315,12 +315,13 @@ def model(weak, sizes):
     seen = rows[-1]
 
     def grown(name, ranks):
-        """At the weak series' points per rank: linear in log2 of the ranks."""
+        """At the weak series' points per rank: linear in log2 of the ranks, and never less than on
+        the most ranks counted."""
         pairs = [(math.log2(row["ranks"]), row[name]) for row in rows]
         mx, my = (sum(p[k] for p in pairs) / len(pairs) for k in (0, 1))
         slope = (sum((x - mx) * (y - my) for x, y in pairs)
                  / sum((x - mx) ** 2 for x, _ in pairs))
-        return my + slope * (math.log2(ranks) - mx)
+        return max(my + slope * (math.log2(ranks) - mx), seen[name])
 
     def power(name):
         return exponent([(row["points"], row[name]) for row in sizes
