@@ -161,6 +161,16 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self
     }
 
+    /// Acts on the matrix as multigrid reads it.
+    fn with_rows<T>(
+        &self,
+        matrix: &mut Matrix,
+        act: impl FnOnce(&Assembled) -> Result<T>,
+    ) -> Result<T> {
+        let (own, other) = matrix.storage()?;
+        act(&Assembled::new(self.numbering, self.pattern, &own, other.as_deref().unwrap_or(&[])))
+    }
+
     pub fn settings(&self) -> &NewtonSettings {
         &self.settings
     }
@@ -418,18 +428,16 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
-        let (own, other) = matrix.storage()?;
-        let other = other.as_deref().unwrap_or(&[]);
-        let rows = Assembled::new(self.numbering, self.pattern, &own, other);
-        multigrid::of_system(self.world, self.grid, self.numbering, &rows)
+        self.with_rows(matrix, |rows| {
+            multigrid::of_system(self.world, self.grid, self.numbering, rows)
+        })
     }
 
     fn fill(&mut self, matrix: &mut Matrix, exact: &mut BlockProduct<f64>) -> Result<()> {
-        let (own, other) = matrix.storage()?;
-        let other = other.as_deref().unwrap_or(&[]);
-        let rows = Assembled::new(self.numbering, self.pattern, &own, other);
-        multigrid::fill::<_, D>(&rows, exact);
-        Ok(())
+        self.with_rows(matrix, |rows| {
+            multigrid::fill::<_, D>(rows, exact);
+            Ok(())
+        })
     }
 }
 

@@ -5,7 +5,7 @@ use crate::parallel::{HaloPlan, World, exchange};
 use crate::tensor::fused::{self, Block, add_product, add_transposed_product};
 
 use super::aggregate::Aggregates;
-use super::level::{BlockRows, Nodes, Rows};
+use super::level::{self, BlockRows, Nodes, Rows};
 use super::prolongator::Prolongator;
 
 /// The next level.
@@ -37,11 +37,7 @@ impl Seen {
     /// Place of a global number that is known to be there.
     #[inline(always)]
     fn place(&self, number: i32) -> usize {
-        let own = number.wrapping_sub(self.first) as usize;
-        if own < self.owned {
-            return own;
-        }
-        self.owned + self.ghosts.partition_point(|&ghost| ghost < number)
+        level::place(self.first, self.owned, &self.ghosts, number)
     }
 
     fn number(&self, place: usize) -> i32 {
@@ -84,7 +80,8 @@ pub fn coarse_operator<const K: usize, const C: usize>(
     let seen = Seen::new(aggregates, prolongator.columns.clone());
     let mut sums = Sums { rows: vec![Vec::new(); seen.len()], blocks: Vec::new() };
     multiply(nodes.owned, rows, prolongator, &seen, &mut sums);
-    let received = hand_over(world, aggregates, &seen, &sums)?;
+    let owners = Owners::of(world, aggregates);
+    let received = hand_over(world, &owners, &seen, &sums)?;
 
     // Columns that come with other ranks' contributions, and those of the transfer.
     let mut ghosts: Vec<i32> = Vec::new();
@@ -114,7 +111,7 @@ pub fn coarse_operator<const K: usize, const C: usize>(
         coarse.values.extend(entries.iter().map(|&(_, place)| sums.blocks[place as usize]));
         coarse.offsets.push(coarse.columns.len());
     }
-    Ok(Coarse { nodes: coarse_nodes(world, nodes, aggregates, &known)?, rows: coarse })
+    Ok(Coarse { nodes: coarse_nodes(world, nodes, aggregates, &owners, &known)?, rows: coarse })
 }
 
 /// Row by row of the fine level: (A P)_i, then P_i^T (A P)_i into the coarse rows.
@@ -194,11 +191,10 @@ fn multiply_in<const K: usize, const C: usize, const FUSED: bool>(
 /// Contributions to other ranks' rows go to their owners: row, column and values.
 fn hand_over<const C: usize>(
     world: &World,
-    aggregates: &Aggregates,
+    owners: &Owners,
     seen: &Seen,
     sums: &Sums<C>,
 ) -> Result<Vec<(usize, Vec<f64>)>> {
-    let owners = Owners::of(world, aggregates);
     let mut outgoing: Vec<(usize, Vec<f64>)> = Vec::new();
     for (row, entries) in sums.rows.iter().enumerate().skip(seen.owned) {
         let owner = owners.of_number(seen.number(row));
@@ -232,9 +228,9 @@ fn coarse_nodes(
     world: &World,
     fine: &Nodes,
     aggregates: &Aggregates,
+    owners: &Owners,
     known: &Seen,
 ) -> Result<Nodes> {
-    let owners = Owners::of(world, aggregates);
     let ghosts: Vec<(usize, usize)> =
         known.ghosts.iter().map(|&number| (owners.of_number(number), number as usize)).collect();
     let first = known.first as usize;

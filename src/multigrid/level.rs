@@ -24,10 +24,18 @@ impl Nodes {
         self.global.len()
     }
 
-    /// Global number of the first owned node, if there is one.
-    pub fn first(&self) -> i32 {
-        if self.owned > 0 { self.global[0] } else { 0 }
+    /// Place of a global number that is known to be here.
+    pub fn place(&self, number: i32) -> usize {
+        let (own, ghosts) = self.global.split_at(self.owned);
+        place(own.first().copied().unwrap_or(0), self.owned, ghosts, number)
     }
+}
+
+/// Where a global number stands among `owned` ones from `first` on and the `ghosts` behind them.
+#[inline(always)]
+pub fn place(first: i32, owned: usize, ghosts: &[i32], number: i32) -> usize {
+    let own = number.wrapping_sub(first) as usize;
+    if own < owned { own } else { owned + ghosts.partition_point(|&ghost| ghost < number) }
 }
 
 /// The owned rows of a square matrix in blocks of `K` degrees of freedom per node.

@@ -179,23 +179,12 @@ fn transfer<const K: usize, const C: usize>(
     prolongator: &Prolongator<K, C>,
     coarse: &Nodes,
 ) -> BlockProduct<f32> {
-    let first = coarse.first();
-    let ghosts = &coarse.global[coarse.owned..];
-    let count = prolongator.offsets[fine.owned];
-    BlockProduct::collect::<K, C>(
-        fine.owned,
-        coarse.owned,
-        ghosts.to_vec(),
-        count,
-        |row, blocks| {
-            let (columns, values) = prolongator.row(row);
-            blocks.extend(columns.iter().zip(values).map(|(&number, block)| {
-                let own = number.wrapping_sub(first) as usize;
-                let ghost = || coarse.owned + ghosts.partition_point(|&ghost| ghost < number);
-                (if own < coarse.owned { own } else { ghost() }, *block)
-            }));
-        },
-    )
+    let (ghosts, count) = (coarse.global[coarse.owned..].to_vec(), prolongator.offsets[fine.owned]);
+    BlockProduct::collect::<K, C>(fine.owned, coarse.owned, ghosts, count, |row, blocks| {
+        let (columns, values) = prolongator.row(row);
+        let places = columns.iter().map(|&number| coarse.place(number));
+        blocks.extend(places.zip(values.iter().copied()));
+    })
 }
 
 /// The last level in compressed rows. A motion that no node of the finer level takes part in has

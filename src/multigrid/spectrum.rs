@@ -42,8 +42,7 @@ pub fn largest<const K: usize>(
         nodes.halo.forward(world, &mut x, K)?;
         product.multiply_local(&x, &mut w);
         for (row, w) in w.iter_mut().enumerate() {
-            let share = if diagonal.is_empty() { 0.0 } else { beta * before[row] };
-            *w = *w * root[row] - share;
+            *w = *w * root[row] - beta * before[row];
         }
         let alpha = dot(&w, &v);
         for (w, v) in w.iter_mut().zip(&v) {

@@ -53,18 +53,14 @@ impl<T: Stored> BlockProduct<T> {
         own_columns: usize,
         ghosts: Vec<i32>,
         blocks: usize,
-        mut row: impl FnMut(usize, &mut Row<R, C>),
+        row: impl FnMut(usize, &mut Row<R, C>),
     ) -> Self {
         let new = |blocks| Blocks::growing([R, C], blocks).expect("blocks with a kernel");
         let (mut own, mut other) = (new(blocks), new(0));
-        let (mut inside, mut outside) = (Vec::new(), Vec::new());
-        for k in 0..rows {
-            row(k, &mut inside);
-            split(&mut inside, &mut outside, own_columns);
-            own.push(&inside);
-            other.push(&outside);
-            inside.clear();
-        }
+        each_row(rows, own_columns, row, |inside, outside| {
+            own.push(inside);
+            other.push(outside);
+        });
         BlockProduct {
             own: Own::Whole(own.finish()),
             other: other.finish(),
@@ -87,19 +83,15 @@ impl<T: Stored> BlockProduct<T> {
     }
 
     /// The values of a symmetric matrix, as in [`Self::collect`]; again when they have changed.
-    pub fn fill<const K: usize>(&mut self, mut row: impl FnMut(usize, &mut Row<K, K>)) {
+    pub fn fill<const K: usize>(&mut self, row: impl FnMut(usize, &mut Row<K, K>)) {
         let Own::Symmetric(half) = &mut self.own else { return };
         half.clear();
         let mut other = Blocks::growing([K, K], 0).expect("blocks with a kernel");
-        let (mut inside, mut outside) = (Vec::new(), Vec::new());
         let rows = self.size[0] / K;
-        for k in 0..rows {
-            row(k, &mut inside);
-            split(&mut inside, &mut outside, rows);
-            half.push(&inside);
-            other.push(&outside);
-            inside.clear();
-        }
+        each_row(rows, rows, row, |inside, outside| {
+            half.push(inside);
+            other.push(outside);
+        });
         self.other = other.finish();
     }
 
@@ -157,20 +149,28 @@ impl BlockProduct<f64> {
     }
 }
 
-/// Moves the blocks in columns of other ranks to `outside`.
-fn split<const R: usize, const C: usize>(
-    inside: &mut Row<R, C>,
-    outside: &mut Row<R, C>,
+/// Shows each row that `row` gives as its blocks in own columns and those in columns of other ranks.
+#[inline(always)]
+fn each_row<const R: usize, const C: usize>(
+    rows: usize,
     own_columns: usize,
+    mut row: impl FnMut(usize, &mut Row<R, C>),
+    mut take: impl FnMut(&Row<R, C>, &Row<R, C>),
 ) {
-    outside.clear();
-    inside.retain(|&(column, block)| {
-        let here = column < own_columns;
-        if !here {
-            outside.push((column - own_columns, block));
-        }
-        here
-    });
+    let (mut inside, mut outside) = (Vec::new(), Vec::new());
+    for k in 0..rows {
+        inside.clear();
+        outside.clear();
+        row(k, &mut inside);
+        inside.retain(|&(column, block)| {
+            let here = column < own_columns;
+            if !here {
+                outside.push((column - own_columns, block));
+            }
+            here
+        });
+        take(&inside, &outside);
+    }
 }
 
 /// One reference to a PETSc shell matrix over a [`BlockProduct`].
