@@ -453,6 +453,16 @@ fn solve<const D: usize>(
     options: &[(&str, &str)],
     levels: bool,
 ) -> Solved {
+    attempt(world, block, prefix, options, levels).unwrap()
+}
+
+fn attempt<const D: usize>(
+    world: &World,
+    block: Block<D>,
+    prefix: &str,
+    options: &[(&str, &str)],
+    levels: bool,
+) -> Result<Solved> {
     let share = block.share(world);
     let mut problem = Hardening { world, share, levels, made: [0; 2], residual: f64::NAN };
     let (offsets, columns, values) = problem.scalars(&problem.share.rows);
@@ -469,16 +479,33 @@ fn solve<const D: usize>(
     snes.set_defaults(options).unwrap();
     snes.set_from_options().unwrap();
     let mut x = matrix.vector().unwrap();
-    let outcome = snes.solve(&mut problem, &mut matrix, &mut x).unwrap();
+    let outcome = snes.solve(&mut problem, &mut matrix, &mut x)?;
     assert!(outcome.converged, "{prefix} {outcome:?}");
     let x = x.values().unwrap().to_vec();
-    Solved {
+    Ok(Solved {
         linear: outcome.linear_iterations_total,
         newton: outcome.iterations,
         made: problem.made,
         square: world.sum(x.iter().map(|x| x * x).sum()),
         x,
-    }
+    })
+}
+
+#[test]
+fn smoothers_that_need_entries_are_refused() {
+    on_ranks("smoothers_that_need_entries_are_refused", &[1, 2], |universe| {
+        let _session = Session::start(universe, &[], &[]).unwrap();
+        let world = World::new(universe.world().duplicate());
+        let block = Block { cells: [12, 9], held: true };
+        for kind in ["sor", "eisenstat"] {
+            let options = [("mg_levels_pc_type", kind)];
+            let refused = attempt(&world, block, &format!("{kind}_"), &options, true);
+            let text = refused.err().expect("an error").to_string();
+            assert!(text.contains("pc_type gamg"), "{text}");
+        }
+        // The next solver is not harmed.
+        solve(&world, block, "next_", &[], true);
+    });
 }
 
 #[test]

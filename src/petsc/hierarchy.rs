@@ -48,9 +48,14 @@ const SMOOTHED: [f64; 2] = [0.06, 1.1];
 
 /// Whether the solver's preconditioner is a cycle on given levels.
 pub(super) fn wanted(ksp: sys::KSP) -> Result<bool> {
-    let (mut pc, mut same) = (null_mut(), sys::PETSC_FALSE);
+    let mut pc = null_mut();
     petsc!(KSPGetPC(ksp, &mut pc))?;
-    petsc!(PetscObjectTypeCompare(pc.cast(), sys::PCMG.as_ptr().cast(), &mut same))?;
+    is_type(pc, sys::PCMG)
+}
+
+fn is_type(pc: sys::PC, kind: &[u8]) -> Result<bool> {
+    let mut same = sys::PETSC_FALSE;
+    petsc!(PetscObjectTypeCompare(pc.cast(), kind.as_ptr().cast(), &mut same))?;
     Ok(same != sys::PETSC_FALSE)
 }
 
@@ -166,6 +171,15 @@ fn put_level(
     petsc!(KSPSetOperators(smoother, matrix.raw(), matrix.raw()))?;
     let [low, high] = SMOOTHED.map(|share| share * largest);
     petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
+    petsc!(KSPSetFromOptions(smoother))?;
+    // PETSc would find out in the middle of a cycle, and not get out of it without a crash.
+    if is_type(inner, sys::PCSOR)? || is_type(inner, sys::PCEISENSTAT)? {
+        return Err(Error::Input(
+            "SOR and Eisenstat's form of it need the entries of the matrix, and the levels of multigrid (pc_type mg) have \
+             only products: use mg_levels_pc_type jacobi, or pc_type gamg"
+                .into(),
+        ));
+    }
     let transfer = Shell::new(comm, transfer)?;
     petsc!(PCMGSetInterpolation(pc, level, transfer.raw()))?;
     petsc!(PCMGSetRestriction(pc, level, transfer.raw()))?;
