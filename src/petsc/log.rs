@@ -37,37 +37,47 @@ impl Phase {
     }
 }
 
-/// Stage numbers given by PETSc.
+/// Stage numbers given by PETSc; none where nobody asked for a log: a stage carries a table of all
+/// events, 1.7 MB for the six.
 #[derive(Debug, Clone)]
-pub struct Stages([sys::PetscLogStage; Phase::ALL.len()]);
+pub struct Stages(Option<[sys::PetscLogStage; Phase::ALL.len()]>);
 
 impl Stages {
     /// Collective; once per session.
     pub fn register() -> Result<Self> {
         require_running()?;
+        let mut logging = sys::PETSC_FALSE;
+        petsc!(PetscLogIsActive(&mut logging))?;
+        if logging == sys::PETSC_FALSE {
+            return Ok(Stages(None));
+        }
         let mut stages = [0; Phase::ALL.len()];
         for phase in Phase::ALL {
             let name = c_text(phase.name())?;
             petsc!(PetscLogStageRegister(name.as_ptr(), &mut stages[phase as usize]))?;
         }
-        Ok(Stages(stages))
+        Ok(Stages(Some(stages)))
     }
 
     /// Counts what follows under `phase` until the guard is dropped; phases may nest.
     pub fn enter(&self, phase: Phase) -> Result<Entered> {
-        petsc!(PetscLogStagePush(self.0[phase as usize]))?;
-        Ok(Entered(()))
+        if let Some(stages) = &self.0 {
+            petsc!(PetscLogStagePush(stages[phase as usize]))?;
+        }
+        Ok(Entered { pushed: self.0.is_some() })
     }
 }
 
 /// Leaves the phase when dropped.
 #[must_use]
 #[derive(Debug)]
-pub struct Entered(());
+pub struct Entered {
+    pushed: bool,
+}
 
 impl Drop for Entered {
     fn drop(&mut self) {
-        if super::check::running() {
+        if self.pushed && super::check::running() {
             // SAFETY: pops the stage pushed by `enter`.
             unsafe { sys::PetscLogStagePop() };
         }
