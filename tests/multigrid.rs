@@ -287,6 +287,27 @@ fn levels_do_not_depend_on_the_ranks() {
     });
 }
 
+#[test]
+fn coarse_levels_gather_on_fewer_ranks() {
+    on_ranks("coarse_levels_gather_on_fewer_ranks", &[1, 2, 3, 4], |universe| {
+        let _session = Session::start(universe, &[], &[]).unwrap();
+        let world = World::new(universe.world().duplicate());
+        let block = Block { cells: [150, 101], held: true };
+        same_levels(&world, block);
+        let hierarchy = build(&world, &block.share(&world));
+        let mut rows: Vec<usize> =
+            hierarchy.levels.iter().map(|level| level.product.rows()).collect();
+        rows.push(hierarchy.coarsest.offsets.len() - 1);
+        let nodes: Vec<usize> = rows[1..].iter().map(|&rows| world.sum_usize(rows) / 3).collect();
+        let holders: Vec<usize> =
+            rows[1..].iter().map(|&rows| world.sum_usize(usize::from(rows > 0))).collect();
+        // Of more than two ranks the second has no nodes.
+        let workers = if world.size() < 3 { world.size() } else { world.size() - 1 };
+        assert!(nodes[0] > 100 * world.size() && nodes[1] < 300 && nodes[2] < 100, "{nodes:?}");
+        assert_eq!(holders, [workers, workers.min(2), 1], "{nodes:?}");
+    });
+}
+
 /// Nodes of each level, largest eigenvalues, trace and norm of the last matrix, against one rank.
 fn same_levels<const D: usize>(world: &World, block: Block<D>) {
     let numbers = |world: &World| {

@@ -26,7 +26,7 @@ pub struct Group {
 pub struct Aggregates {
     /// Per local node; `None` for nodes without strong couplings, which the smoother solves.
     pub group: Vec<Option<Group>>,
-    /// Owned nodes that are roots; the k-th is the k-th coarse node of this rank.
+    /// Owned nodes that are roots, in the order of their coarse nodes.
     pub roots: Vec<u32>,
     /// Global number of the first of them.
     pub first: usize,

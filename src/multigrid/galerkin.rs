@@ -6,6 +6,7 @@ use crate::tensor::fused::{self, Block, add_product, add_transposed_product};
 
 use super::aggregate::Aggregates;
 use super::level::{self, BlockRows, Nodes, Rows};
+use super::owners::Owners;
 use super::prolongator::Prolongator;
 
 /// The next level.
@@ -22,8 +23,8 @@ struct Seen {
 }
 
 impl Seen {
-    fn new(aggregates: &Aggregates, mut ghosts: Vec<i32>) -> Self {
-        let (first, owned) = (aggregates.first as i32, aggregates.roots.len());
+    fn new(owners: &Owners, mut ghosts: Vec<i32>) -> Self {
+        let (first, owned) = (owners.owned().start as i32, owners.owned().len());
         ghosts.retain(|&number| !(first..first + owned as i32).contains(&number));
         ghosts.sort_unstable();
         ghosts.dedup();
@@ -77,10 +78,10 @@ pub fn coarse_operator<const K: usize, const C: usize>(
     prolongator: &Prolongator<K, C>,
     aggregates: &Aggregates,
 ) -> Result<Coarse<C>> {
-    let seen = Seen::new(aggregates, prolongator.columns.clone());
+    let owners = Owners::of(world, aggregates);
+    let seen = Seen::new(&owners, prolongator.columns.clone());
     let mut sums = Sums { rows: vec![Vec::new(); seen.len()], blocks: Vec::new() };
     multiply(nodes.owned, rows, prolongator, &seen, &mut sums);
-    let owners = Owners::of(world, aggregates);
     let received = hand_over(world, &owners, &seen, &sums)?;
 
     // Columns that come with other ranks' contributions, and those of the transfer.
@@ -90,7 +91,7 @@ pub fn coarse_operator<const K: usize, const C: usize>(
     ghosts.extend_from_slice(&prolongator.columns[..prolongator.offsets[nodes.owned]]);
     let each = || received.iter().flat_map(|(_, words)| words.chunks_exact(2 + C * C));
     ghosts.extend(each().map(|entry| entry[1] as i32));
-    let known = Seen::new(aggregates, ghosts);
+    let known = Seen::new(&owners, ghosts);
     let place: Vec<u32> =
         (0..seen.len()).map(|place| known.place(seen.number(place)) as u32).collect();
     sums.rows.truncate(seen.owned);
@@ -210,20 +211,6 @@ fn hand_over<const C: usize>(
     exchange(world, outgoing)
 }
 
-/// First coarse node of each rank.
-struct Owners(Vec<u64>);
-
-impl Owners {
-    fn of(world: &World, aggregates: &Aggregates) -> Self {
-        Owners(world.gather(aggregates.first as u64))
-    }
-
-    /// Ranks without nodes begin where the next one does.
-    fn of_number(&self, number: i32) -> usize {
-        self.0.partition_point(|&first| first <= number as u64) - 1
-    }
-}
-
 fn coarse_nodes(
     world: &World,
     fine: &Nodes,
@@ -238,12 +225,8 @@ fn coarse_nodes(
         number.checked_sub(first).filter(|&place| place < known.owned)
     })?;
     const VALUES: usize = 4;
-    let mut values = vec![0.0; known.len() * VALUES];
-    for (values, &root) in values.chunks_exact_mut(VALUES).zip(&aggregates.roots) {
-        let root = root as usize;
-        values[0] = fine.key[root];
-        values[1..].copy_from_slice(&fine.position[root]);
-    }
+    let mut values = owners.roots(world, fine, aggregates)?;
+    values.resize(known.len() * VALUES, 0.0);
     halo.forward(world, &mut values, VALUES)?;
     Ok(Nodes {
         owned: known.owned,

@@ -8,6 +8,7 @@
 //! | motions of a coarse node | `rigid.rs` |
 //! | largest eigenvalue, for damping and smoother | `spectrum.rs` |
 //! | transfer between levels | `prolongator.rs` |
+//! | whose nodes they are | `owners.rs` |
 //! | coarse operator | `galerkin.rs` |
 //! | nodes and rows of a level | `level.rs` |
 //!
@@ -18,6 +19,7 @@
 mod aggregate;
 mod galerkin;
 mod level;
+mod owners;
 mod prolongator;
 mod rigid;
 mod spectrum;

@@ -5,13 +5,16 @@
 //! transfers multiply by matrices in single precision: they stream from memory, and have less
 //! than half the bytes. The iteration outside keeps the exact matrix, so the answer is the same.
 
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 
+use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
+use mpi::traits::{Communicator, CommunicatorCollectives};
 
 use super::block_product::{BlockProduct, Shell};
-use super::check::petsc;
+use super::check::{petsc, text_of};
 use super::matrix::Matrix;
+use super::options::set_default;
 use super::sys;
 use crate::error::{Error, Result};
 
@@ -186,10 +189,22 @@ fn put_level(
     Ok(matrix)
 }
 
+/// Solved by factors: on the rank that has all of it, else by PETSc's default, a copy for each.
 fn put_coarsest(pc: sys::PC, comm: &SimpleCommunicator, rows: CoarsestRows) -> Result<()> {
     let CoarsestRows { block, offsets, columns, values } = rows;
-    let matrix = Matrix::from_csr(comm, block, offsets.len() - 1, &offsets, &columns, &values)?;
+    let count = offsets.len() - 1;
+    let matrix = Matrix::from_csr(comm, block, count, &offsets, &columns, &values)?;
     let mut coarse = null_mut();
     petsc!(PCMGGetCoarseSolve(pc, &mut coarse))?;
-    petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))
+    petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))?;
+    let mut holders = 0;
+    comm.all_reduce_into(&i32::from(count > 0), &mut holders, SystemOperation::sum());
+    if holders == 1 && comm.size() > 1 {
+        let (mut inner, mut prefix) = (null_mut(), null());
+        petsc!(KSPGetPC(coarse, &mut inner))?;
+        petsc!(PCSetType(inner, sys::PCBJACOBI.as_ptr().cast()))?;
+        petsc!(KSPGetOptionsPrefix(coarse, &mut prefix))?;
+        set_default(&format!("{}sub_pc_type", text_of(prefix)), "lu")?;
+    }
+    Ok(())
 }
