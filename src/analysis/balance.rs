@@ -158,10 +158,8 @@ fn of_candidate<const D: usize>(
     cost: f64,
 ) -> f64 {
     let mut load = vec![0.0; world.size()];
-    for x in &points.position {
-        if let Some(cell) = model.grid.locate(x) {
-            load[candidate.owner_of_cell(&model.grid, cell)] += cost;
-        }
+    for cell in model.grid.locate_each(points.position.iter()).flatten() {
+        load[candidate.owner_of_cell(&model.grid, cell)] += cost;
     }
     let load = world.sum_slice(&load);
     let largest = load.iter().copied().fold(0.0, f64::max);

@@ -11,7 +11,7 @@ use crate::material::Material;
 use crate::output::checkpoint::Restored;
 use crate::parallel::{self, Partition, World};
 use crate::points::Points;
-use crate::points::seed::{self, Share};
+use crate::points::seed::{self, CellByCell, Share};
 
 use super::balance::Balance;
 use super::discretise::Model;
@@ -21,14 +21,15 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     let grid = world.fail_together(build_grid(&deck))?;
     check_tags(&deck, &grid)?;
     let share = Share { rank: world.rank(), ranks: world.size() };
-    let mut points = world.fail_together(seed::seed(&deck, &grid, share))?;
-    check_bodies(world, &deck, &grid, &points)?;
+    let (mut points, first_ids) = world.fail_together(seed::seed(&deck, &grid, share))?;
+    let cells = check_bodies(world, &deck, &grid, &points)?;
     let brick = deck.parallel.brick;
     let partition = match deck.parallel.initial {
-        Initial::Balanced => Partition::build(world, &grid, brick, &points, None)?,
-        Initial::Slabs => Partition::slabs(world, &grid, brick, &points)?,
+        Initial::Balanced => Partition::for_cells(world, &grid, brick, &cells, None)?,
+        Initial::Slabs => Partition::slabs(world, &grid, brick, &cells)?,
     };
-    parallel::migrate(world, &partition, &grid, &mut points)?;
+    let seeding = CellByCell::new(&deck, &grid, first_ids)?;
+    parallel::settle(world, &partition, &grid, &mut points, cells, &seeding)?;
     place_point_forces(world, &deck, &mut points)?;
     Ok((model_of(deck, grid, partition)?, points))
 }
@@ -87,7 +88,8 @@ fn model_of<const D: usize>(
     Ok(Model { deck, grid, partition, materials, penalties, manufactured, balance })
 }
 
-fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
+/// The grid that a deck asks for.
+pub fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
     match &deck.grid {
         model::Grid::Lattice(lattice) => {
             let axis = |values: &[f64]| std::array::from_fn(|a| values[a]);
@@ -111,13 +113,13 @@ fn check_tags<const D: usize>(deck: &Deck, grid: &Grid<D>) -> Result<()> {
     Ok(())
 }
 
-/// Every body has points, all inside the grid.
+/// Every body has points, all inside the grid; returns their cells.
 fn check_bodies<const D: usize>(
     world: &World,
     deck: &Deck,
     grid: &Grid<D>,
     points: &Points<D>,
-) -> Result<()> {
+) -> Result<Vec<usize>> {
     let mut counts = vec![0.0; deck.bodies.len()];
     for &body in &points.body {
         counts[body as usize] += 1.0;
@@ -131,7 +133,10 @@ fn check_bodies<const D: usize>(
             )));
         }
     }
-    let outside = (0..points.len()).find(|&p| grid.locate(&points.position[p]).is_none()).map(|p| {
+    let cells: Vec<usize> =
+        grid.locate_each(points.position.iter()).map_while(|cell| cell).collect();
+    let outside = (cells.len() < points.len()).then(|| {
+        let p = cells.len();
         format!(
             "body \"{}\": point {} at {:?} lies outside the grid; enlarge the grid or move the body",
             deck.bodies[points.body[p] as usize].name, points.id[p], points.position[p]
@@ -139,7 +144,7 @@ fn check_bodies<const D: usize>(
     });
     match world.first_message(outside) {
         Some(message) => Err(Error::Input(message)),
-        None => Ok(()),
+        None => Ok(cells),
     }
 }
 

@@ -1,6 +1,8 @@
 //! Grid to points at the end of a step (Ghost Figure 1 e, f; Lagrangian eq. 16, 31): deformation,
 //! stress, position, domain. A step that would leave an unsound point is refused as a whole.
 
+use std::cell::Cell;
+
 use nalgebra::Matrix3;
 
 use crate::assembly::Numbering;
@@ -76,6 +78,8 @@ pub fn reason_to_refuse<const D: usize>(
     points: &Points<D>,
     increments: &Increments<D>,
 ) -> Option<Refusal> {
+    // Neighbours in the list are mostly neighbours in space.
+    let near = Cell::new(None);
     refused(world, points, |p| {
         let x = points.position[p];
         let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
@@ -83,7 +87,10 @@ pub fn reason_to_refuse<const D: usize>(
             return Some(Fault::NotFinite);
         }
         let fault = fault_of(&increments.deformation[p]);
-        fault.or_else(|| grid.locate(&moved).is_none().then(|| Fault::Leaves(format!("{moved:?}"))))
+        fault.or_else(|| {
+            near.set(grid.locate_near(&moved, near.get()));
+            near.get().is_none().then(|| Fault::Leaves(format!("{moved:?}")))
+        })
     })
 }
 

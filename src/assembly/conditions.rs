@@ -154,7 +154,7 @@ fn cells_of<const D: usize>(
             continue;
         }
         cells.clear();
-        basis::populated_cells(grid, basis, points, p, &mut cells)?;
+        basis::populated_cells(grid, basis, points, p, None, &mut cells)?;
         for &cell in &cells {
             nodes.clear();
             grid.cell_nodes(cell, &mut nodes);

@@ -32,7 +32,8 @@ impl Populated {
         let mut scan = || -> Result<()> {
             for p in 0..points.len() {
                 cells.clear();
-                basis::populated_cells(grid, basis, points, p, &mut cells)?;
+                let near = met.last().map(|&(cell, _)| cell);
+                basis::populated_cells(grid, basis, points, p, near, &mut cells)?;
                 let body = 1 << points.body[p];
                 for &cell in &cells {
                     match met.last_mut() {

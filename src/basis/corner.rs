@@ -22,7 +22,8 @@ pub struct Corners<const D: usize> {
 }
 
 impl<const D: usize> Corners<D> {
-    /// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending.
+    /// Replaces `row` by nodes, S and dS/dX~ of point `p`, merged and ascending. `hint`: a cell
+    /// near the first corner; left at that of the last.
     ///
     /// Error: a corner beyond reach.
     pub fn fill(
@@ -30,10 +31,11 @@ impl<const D: usize> Corners<D> {
         grid: &Grid<D>,
         points: &Points<D>,
         p: usize,
+        hint: &mut Option<usize>,
         row: &mut Row<D>,
     ) -> Result<()> {
         row.clear();
-        for_each_place(grid, points, p, &self.positions, |corner, at| {
+        for_each_place(grid, points, p, &self.positions, hint, |corner, at| {
             row.add_corner(at, self.weights[corner], &self.gradients[corner]);
         })?;
         row.merge();
@@ -49,16 +51,18 @@ pub(super) fn populated_cells<const D: usize>(
     points: &Points<D>,
     p: usize,
     corners: &[[f64; D]; 8],
+    mut hint: Option<usize>,
     out: &mut Vec<usize>,
 ) -> Result<()> {
     let start = out.len();
-    for_each_place(grid, points, p, corners, |_, at| out.push(at.cell))?;
+    for_each_place(grid, points, p, corners, &mut hint, |_, at| out.push(at.cell))?;
     super::row::sort_tail(out, start);
     Ok(())
 }
 
 /// Calls `visit` with each corner's number and the grid's basis there. Corners on a face count
-/// for the cell on the side of the domain's centre.
+/// for the cell on the side of the domain's centre. `hint`: a cell near the first corner; left at
+/// that of the last.
 ///
 /// Error: a corner beyond reach, named by point, corner and position.
 pub(super) fn for_each_place<const D: usize>(
@@ -66,14 +70,14 @@ pub(super) fn for_each_place<const D: usize>(
     points: &Points<D>,
     p: usize,
     corners: &[[f64; D]; 8],
+    hint: &mut Option<usize>,
     mut visit: impl FnMut(usize, &Interpolation<D>),
 ) -> Result<()> {
     let corners = &corners[..1 << D];
     let centre =
         std::array::from_fn(|a| corners.iter().map(|x| x[a]).sum::<f64>() / corners.len() as f64);
-    let mut hint = None;
     for (corner, x) in corners.iter().enumerate() {
-        let at = grid.interpolate_towards(x, &centre, REACH, hint).ok_or_else(|| {
+        let at = grid.interpolate_towards(x, &centre, REACH, *hint).ok_or_else(|| {
             Error::Run(format!(
                 "corner {} of point {} is outside the grid at {x:?} m (the point is at {:?} m); \
                  enlarge the grid, or let the mesh follow the body",
@@ -82,7 +86,7 @@ pub(super) fn for_each_place<const D: usize>(
                 points.position[p]
             ))
         })?;
-        hint = Some(at.cell);
+        *hint = Some(at.cell);
         visit(corner, &at);
     }
     Ok(())

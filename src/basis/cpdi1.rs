@@ -108,5 +108,5 @@ pub fn check_step<const D: usize>(
         std::array::from_fn(|j| (0..D).map(|k| increment[i][k] * before[k][j]).sum())
     });
     let centre = std::array::from_fn(|a| points.position[p][a] + displacement[a]);
-    for_each_place(after, points, p, &positions(&centre, &edges), |_, _| ())
+    for_each_place(after, points, p, &positions(&centre, &edges), &mut None, |_, _| ())
 }

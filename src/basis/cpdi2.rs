@@ -129,8 +129,9 @@ pub fn update_corners<const D: usize>(
     points: &mut Points<D>,
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<()> {
+    let mut hint = None;
     for p in 0..points.len() {
-        points.corners[p] = moved_corners(grid, points, p, displacement)?;
+        points.corners[p] = moved_corners(grid, points, p, &mut hint, displacement)?;
         corners(points, p)?;
     }
     Ok(())
@@ -141,10 +142,11 @@ fn moved_corners<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,
+    hint: &mut Option<usize>,
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<[[f64; D]; 8]> {
     let mut moved = points.corners[p];
-    for_each_place(grid, points, p, &points.corners[p], |corner, at| {
+    for_each_place(grid, points, p, &points.corners[p], hint, |corner, at| {
         for (&node, &n) in at.nodes.iter().zip(&at.weights).take(at.count) {
             let u = displacement(node);
             for (x, u) in moved[corner].iter_mut().zip(&u) {
@@ -165,9 +167,10 @@ pub fn check_step<const D: usize>(
     p: usize,
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<()> {
-    let moved = moved_corners(grid, points, p, displacement)?;
+    let mut hint = None;
+    let moved = moved_corners(grid, points, p, &mut hint, displacement)?;
     sound(points, p, &moved)?;
-    for_each_place(after, points, p, &moved, |_, _| ())
+    for_each_place(after, points, p, &moved, &mut hint, |_, _| ())
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ fn influence1<const D: usize>(
     p: usize,
     row: &mut Row<D>,
 ) -> Result<()> {
-    cpdi1::corners(points, p)?.fill(grid, points, p, row)
+    cpdi1::corners(points, p)?.fill(grid, points, p, &mut None, row)
 }
 
 fn influence2<const D: usize>(
@@ -29,7 +29,7 @@ fn influence2<const D: usize>(
     p: usize,
     row: &mut Row<D>,
 ) -> Result<()> {
-    corners(points, p)?.fill(grid, points, p, row)
+    corners(points, p)?.fill(grid, points, p, &mut None, row)
 }
 
 fn point<const D: usize>(x: [f64; D], half: [f64; D]) -> Points<D> {
@@ -301,7 +301,7 @@ fn a_domain_across_a_node_has_known_weights() {
         assert!((ds[1] - line[i] * slope[j] / 0.8).abs() < 1e-13);
     }
     let mut cells = vec![99];
-    crate::basis::populated_cells(&grid, Basis::Cpdi1, &points, 0, &mut cells).unwrap();
+    crate::basis::populated_cells(&grid, Basis::Cpdi1, &points, 0, None, &mut cells).unwrap();
     assert_eq!(cells[0], 99);
     assert_eq!(&cells[1..], row.cells());
 }

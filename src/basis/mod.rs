@@ -100,34 +100,38 @@ pub fn map_points<const D: usize>(
     basis: Basis,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
+    let mut hint = None;
     match basis {
         Basis::Mpm => mpm::map_points(grid, points),
         Basis::Gimp => gimp::map_points(grid, points),
-        Basis::Cpdi1 => {
-            row::map_points(points, |p, row| cpdi1::corners(points, p)?.fill(grid, points, p, row))
-        }
-        Basis::Cpdi2 => {
-            row::map_points(points, |p, row| cpdi2::corners(points, p)?.fill(grid, points, p, row))
-        }
+        Basis::Cpdi1 => row::map_points(points, |p, row| {
+            cpdi1::corners(points, p)?.fill(grid, points, p, &mut hint, row)
+        }),
+        Basis::Cpdi2 => row::map_points(points, |p, row| {
+            cpdi2::corners(points, p)?.fill(grid, points, p, &mut hint, row)
+        }),
     }
 }
 
 /// Appends the cells populated by point `p`: strictly overlapped by its domain, or holding it.
-/// Their nodes together are the nodes of row `p` of [`map_points`].
+/// Their nodes together are the nodes of row `p` of [`map_points`]. A `hint`, a cell near the
+/// point, saves a search on a mesh; it never changes the answer.
 pub fn populated_cells<const D: usize>(
     grid: &Grid<D>,
     basis: Basis,
     points: &Points<D>,
     p: usize,
+    hint: Option<usize>,
     out: &mut Vec<usize>,
 ) -> Result<()> {
     match basis {
-        Basis::Mpm => mpm::populated_cells(grid, points, p, out),
+        Basis::Mpm => mpm::populated_cells(grid, points, p, hint, out),
         Basis::Gimp => gimp::populated_cells(grid, points, p, out),
         Basis::Cpdi1 => {
-            corner::populated_cells(grid, points, p, &cpdi1::corner_positions(points, p), out)
+            let corners = cpdi1::corner_positions(points, p);
+            corner::populated_cells(grid, points, p, &corners, hint, out)
         }
-        Basis::Cpdi2 => corner::populated_cells(grid, points, p, &points.corners[p], out),
+        Basis::Cpdi2 => corner::populated_cells(grid, points, p, &points.corners[p], hint, out),
     }
 }
 

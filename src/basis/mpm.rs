@@ -75,8 +75,10 @@ pub(super) fn populated_cells<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,
+    hint: Option<usize>,
     out: &mut Vec<usize>,
 ) -> Result<()> {
-    out.push(grid.locate(&points.position[p]).ok_or_else(|| outside(grid, points, p))?);
+    let x = &points.position[p];
+    out.push(grid.locate_near(x, hint).ok_or_else(|| outside(grid, points, p))?);
     Ok(())
 }

@@ -37,7 +37,7 @@ fn map<const D: usize>(basis: Basis, points: &Points<D>) -> Influences<D> {
 
 fn cells_of<const D: usize>(basis: Basis, points: &Points<D>, p: usize) -> Vec<usize> {
     let mut cells = Vec::new();
-    populated_cells(&Grid::Lattice(lattice()), basis, points, p, &mut cells).expect("inside");
+    populated_cells(&Grid::Lattice(lattice()), basis, points, p, None, &mut cells).expect("inside");
     cells
 }
 
@@ -271,7 +271,7 @@ fn a_point_outside_is_named() {
             assert!(matches!(&error, Error::Run(text) if text.contains("point 101")), "{error}");
             let mut cells = Vec::new();
             let grid = Grid::Lattice(lattice());
-            assert!(populated_cells(&grid, basis, &points, 1, &mut cells).is_err());
+            assert!(populated_cells(&grid, basis, &points, 1, None, &mut cells).is_err());
         }
     }
 }

@@ -10,8 +10,6 @@
 
 use std::collections::BTreeMap;
 
-use rustc_hash::FxHashMap;
-
 use crate::error::{Error, Result};
 
 use super::element::{self, Element};
@@ -115,17 +113,25 @@ impl<const D: usize> Draft<D> {
     }
 
     fn check_duplicates(&self) -> Result<()> {
-        let mut seen: FxHashMap<[u32; 8], usize> = FxHashMap::default();
-        for (cell, nodes) in self.cells.chunks_exact(self.element.node_count()).enumerate() {
-            let mut key = [u32::MAX; 8];
-            key[..nodes.len()].copy_from_slice(nodes);
-            key.sort_unstable();
-            if let Some(first) = seen.insert(key, cell) {
-                let (first, cell) = (self.cell(first), self.cell(cell));
-                return Err(Error::Input(format!(
-                    "{}: {cell} is a duplicate of {first}; remove one of them",
-                    self.name
-                )));
+        const NONE: u32 = u32::MAX;
+        let corners = self.element.node_count();
+        // The last cell met at its lowest node, and the one met there before each cell.
+        let mut last = vec![NONE; self.positions.len()];
+        let mut before = vec![NONE; self.cells.len() / corners];
+        for (cell, nodes) in self.cells.chunks_exact(corners).enumerate() {
+            let lowest = nodes.iter().fold(NONE, |low, &node| low.min(node));
+            let mut other = std::mem::replace(&mut last[lowest as usize], cell as u32);
+            before[cell] = other;
+            while other != NONE {
+                let known = self.nodes_of(other as usize);
+                if same_nodes(known, nodes) {
+                    let (first, cell) = (self.cell(other as usize), self.cell(cell));
+                    return Err(Error::Input(format!(
+                        "{}: {cell} is a duplicate of {first}; remove one of them",
+                        self.name
+                    )));
+                }
+                other = before[other as usize];
             }
         }
         Ok(())
@@ -178,6 +184,18 @@ impl<const D: usize> Draft<D> {
             ),
         })
     }
+}
+
+/// Whether two cells have the same nodes, in any order.
+fn same_nodes(a: &[u32], b: &[u32]) -> bool {
+    let sorted = |nodes: &[u32]| {
+        let mut key = [u32::MAX; 8];
+        key[..nodes.len()].copy_from_slice(nodes);
+        key.sort_unstable();
+        key
+    };
+    // Mostly one look at each node of the other tells them apart.
+    a.iter().all(|node| b.contains(node)) && sorted(a) == sorted(b)
 }
 
 /// The first cell, and its corner, where det J is not clearly positive.

@@ -110,10 +110,29 @@ impl<const D: usize> Grid<D> {
     /// to the lowest-numbered cell on a mesh. A mesh holds points up to [`locate::REACH`] of a
     /// cell outside it: a polygon that turns inside a round outline cuts other chords.
     pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
+        self.locate_near(x, None)
+    }
+
+    /// As [`Self::locate`]. A `hint` is the cell `x` is likely to be in or beside; it never changes
+    /// the answer.
+    pub fn locate_near(&self, x: &[f64; D], hint: Option<usize>) -> Option<usize> {
         match self {
             Grid::Lattice(lattice) => lattice.locate(x),
-            Grid::Mesh(mesh) => mesh.locate_near(x, locate::REACH, None).map(|found| found.0),
+            Grid::Mesh(mesh) => mesh.locate_near(x, locate::REACH, hint).map(|found| found.0),
         }
+    }
+
+    /// The cell of each place in turn, each found from the one before: neighbours in the list are
+    /// mostly neighbours in space.
+    pub fn locate_each<'a>(
+        &'a self,
+        places: impl Iterator<Item = &'a [f64; D]> + 'a,
+    ) -> impl Iterator<Item = Option<usize>> + 'a {
+        places.scan(None, |last, x| {
+            let found = self.locate_near(x, *last);
+            *last = found.or(*last);
+            Some(found)
+        })
     }
 
     /// Appends the nodes of a cell, counter-clockwise (hex8 order in 3D).

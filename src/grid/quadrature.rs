@@ -4,6 +4,8 @@
 //! into the n^D congruent-in-volume simplices that cutting parallel to the faces gives (the
 //! Kuhn division of a cube, restricted to one of its simplices).
 
+use std::sync::OnceLock;
+
 use super::element::{self, Element};
 
 /// A material point's share of a cell.
@@ -41,7 +43,7 @@ fn boxes<const D: usize>(
     n: [usize; D],
     out: &mut Vec<SubCell<D>>,
 ) {
-    let rule = gauss_rule::<D>(element, 2);
+    let rule = two_points::<D>();
     for flat in 0..n.iter().product() {
         let mut rest = flat;
         let index: [usize; D] = std::array::from_fn(|a| {
@@ -56,7 +58,7 @@ fn boxes<const D: usize>(
         };
         let mut volume = 0.0;
         let mut moment = [0.0; D];
-        for (local, weight) in &rule {
+        for (local, weight) in &rule[..1 << D] {
             // x det J has degree three per axis at most, so two points are exact.
             let xi = place(*local);
             let dn = element.shape_gradients(&xi);
@@ -77,6 +79,17 @@ fn boxes<const D: usize>(
             corners,
         });
     }
+}
+
+/// The rule of two Gauss points per axis on a box, 2^D entries: [`gauss_rule`] without its list, for
+/// every cell of a mesh.
+fn two_points<const D: usize>() -> [([f64; D], f64); 8] {
+    static LINE: OnceLock<Vec<(f64, f64)>> = OnceLock::new();
+    let line = LINE.get_or_init(|| gauss_legendre(2));
+    std::array::from_fn(|flat| {
+        let pick = |a: usize| line[flat >> a & 1];
+        (std::array::from_fn(|a| pick(a).0), (0..D).map(|a| pick(a).1).product())
+    })
 }
 
 /// Corners of the simplices of Kuhn's division: from a cube's low corner along each order of axes.

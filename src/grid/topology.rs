@@ -19,38 +19,60 @@ pub(super) struct Topology {
 pub(super) struct ThirdCell(pub [u32; 3]);
 
 impl Topology {
-    /// O(n log n) in the number of faces; 24 bytes per cell face while it runs.
+    /// O(n) in the number of faces; 24 bytes per cell face and 4 per node while it runs.
     pub fn new(element: Element, cells: &[u32], node_count: usize) -> Result<Self, ThirdCell> {
         let (corners, faces) = (element.node_count(), element.faces());
         let mut lowest_cell = vec![OUTSIDE; node_count];
-        let mut keyed: Vec<([u32; 4], u32, u8)> =
-            Vec::with_capacity(cells.len() / corners * faces.len());
+        // Faces by their lowest node: a handful each, whose order decides which three cells an
+        // error names.
+        let mut ends = vec![0u32; node_count + 1];
         for (cell, nodes) in cells.chunks_exact(corners).enumerate() {
             for &node in nodes {
                 let lowest = &mut lowest_cell[node as usize];
                 *lowest = (*lowest).min(cell as u32);
             }
+            for local in faces {
+                ends[lowest_of(nodes, local) as usize + 1] += 1;
+            }
+        }
+        for node in 1..ends.len() {
+            ends[node] += ends[node - 1];
+        }
+        let mut keyed = vec![([0u32; 3], 0u32, 0u8); cells.len() / corners * faces.len()];
+        for (cell, nodes) in cells.chunks_exact(corners).enumerate() {
             for (face, local) in faces.iter().enumerate() {
                 let mut key = [u32::MAX; 4];
                 for (entry, &a) in key.iter_mut().zip(*local) {
                     *entry = nodes[a];
                 }
                 key.sort_unstable();
-                keyed.push((key, cell as u32, face as u8));
+                let [lowest, others @ ..] = key;
+                let place = &mut ends[lowest as usize];
+                keyed[*place as usize] = (others, cell as u32, face as u8);
+                *place += 1;
             }
         }
-        keyed.sort_unstable();
         let mut neighbours = vec![OUTSIDE; keyed.len()];
-        for group in keyed.chunk_by(|a, b| a.0 == b.0) {
-            match *group {
-                [_] => {}
-                [(_, a, f), (_, b, g)] => {
-                    neighbours[a as usize * faces.len() + f as usize] = b;
-                    neighbours[b as usize * faces.len() + g as usize] = a;
+        let mut start = 0;
+        for &end in &ends[..node_count] {
+            let at_node = &mut keyed[start as usize..end as usize];
+            start = end;
+            at_node.sort_unstable();
+            for group in at_node.chunk_by(|a, b| a.0 == b.0) {
+                match *group {
+                    [_] => {}
+                    [(_, a, f), (_, b, g)] => {
+                        neighbours[a as usize * faces.len() + f as usize] = b;
+                        neighbours[b as usize * faces.len() + g as usize] = a;
+                    }
+                    _ => return Err(ThirdCell([group[0].1, group[1].1, group[2].1])),
                 }
-                _ => return Err(ThirdCell([group[0].1, group[1].1, group[2].1])),
             }
         }
         Ok(Self { neighbours, lowest_cell })
     }
+}
+
+fn lowest_of(nodes: &[u32], local: &[usize]) -> u32 {
+    local.iter().map(|&a| nodes[a]).fold(u32::MAX, u32::min)
 }

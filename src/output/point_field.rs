@@ -163,7 +163,7 @@ impl PointField {
             PointField::Dissipation => out.push(points.dissipation[p]),
             PointField::DeformationGradient => {
                 let f = &points.deformation_gradient[p];
-                out.extend((0..9).map(|k| f[(k / 3, k % 3)]));
+                out.extend_from_slice(&std::array::from_fn::<f64, 9, _>(|k| f[(k / 3, k % 3)]));
             }
             PointField::Jacobian => out.push(jacobian()),
             PointField::Volume => out.push(points.volume(p)),
@@ -187,11 +187,14 @@ impl PointField {
 
 /// Three columns whatever the dimension: readers take positions and vectors in space only.
 pub fn append_vector<const D: usize>(vector: &[f64; D], out: &mut Vec<f64>) {
-    out.extend((0..3).map(|axis| vector.get(axis).copied().unwrap_or(0.0)));
+    let mut row = [0.0; 3];
+    row[..D].copy_from_slice(vector);
+    out.extend_from_slice(&row);
 }
 
 fn append_symmetric(tensor: &Matrix3<f64>, out: &mut Vec<f64>) {
-    out.extend([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)].map(|index| tensor[index]));
+    const UPPER: [(usize, usize); 6] = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+    out.extend_from_slice(&UPPER.map(|index| tensor[index]));
 }
 
 /// ||s|| = sqrt(2 J2)

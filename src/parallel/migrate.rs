@@ -7,6 +7,7 @@ use super::{Partition, World, exchange};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::Points;
+use crate::points::seed::{CellByCell, Share};
 use crate::points::sort::sort_by_cell;
 
 /// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns
@@ -18,28 +19,101 @@ pub fn migrate<const D: usize>(
     grid: &Grid<D>,
     points: &mut Points<D>,
 ) -> Result<usize> {
-    let mut cells = locate(world, grid, points)?;
+    let cells = locate(world, grid, points)?;
+    migrate_from(world, partition, grid, points, cells)
+}
+
+/// As [`migrate`] for points known to be in these cells. Collective.
+pub fn migrate_from<const D: usize>(
+    world: &World,
+    partition: &Partition<D>,
+    grid: &Grid<D>,
+    points: &mut Points<D>,
+    cells: Vec<usize>,
+) -> Result<usize> {
     let leaving = leaving(world, partition, grid, &cells);
     let moved = world.sum_usize(leaving.len());
-    let mut kept: Vec<usize> = Vec::new();
-    if moved > 0 {
-        let mut gone = leaving.iter().map(|&(p, _)| p).peekable();
-        kept = (0..points.len()).filter(|p| gone.next_if_eq(p).is_none()).collect();
-        let arrived = exchange(world, packed(points, &leaving))?;
-        let words = Points::<D>::record_words();
-        points.reserve(arrived.iter().map(|(_, list)| list.len() / words).sum());
-        for (_, list) in arrived {
-            list.chunks_exact(words).for_each(|record| points.unpack(record));
-        }
-        for p in cells.len()..points.len() {
-            // The sender located the same position with the same arithmetic.
-            let cell = grid.locate(&points.position[p]).ok_or_else(|| outside(points, p))?;
-            cells.push(cell);
-            kept.push(p);
+    if moved == 0 {
+        sort_by_cell(points, &cells, None);
+        return Ok(0);
+    }
+    let own = points.len();
+    let arrived = exchange(world, packed(points, &leaving))?;
+    let words = Points::<D>::record_words();
+    points.reserve(arrived.iter().map(|(_, list)| list.len() / words).sum());
+    for (_, list) in arrived {
+        list.chunks_exact(words).for_each(|record| points.unpack(record));
+    }
+    let mut cells = cells;
+    // The sender located the same position with the same arithmetic.
+    append_cells(grid, points, &mut cells)?;
+    sort_by_cell(points, &cells, Some(staying(own, points.len(), &leaving)));
+    Ok(moved)
+}
+
+/// As [`migrate_from`] for points as they were seeded: those that `seeding` can make are made where
+/// they arrive, which is quicker than sending them. Same points in the same order. Collective.
+pub fn settle<const D: usize>(
+    world: &World,
+    partition: &Partition<D>,
+    grid: &Grid<D>,
+    points: &mut Points<D>,
+    mut cells: Vec<usize>,
+    seeding: &CellByCell<'_, D>,
+) -> Result<usize> {
+    let leaving = leaving(world, partition, grid, &cells);
+    let (sent, remade): (Vec<_>, Vec<_>) =
+        leaving.iter().copied().partition(|&(p, _)| !seeding.makes(points.body[p] as usize));
+    if world.sum_usize(remade.len()) == 0 {
+        return migrate_from(world, partition, grid, points, cells);
+    }
+    let here = world.rank();
+    let own = points.len();
+    let mut arrived: BTreeMap<usize, Vec<f64>> =
+        exchange(world, packed(points, &sent))?.into_iter().collect();
+    let wanted = |cell: usize| partition.owner_of_cell(grid, cell) == here;
+    let words = Points::<D>::record_words();
+    for rank in (0..world.size()).filter(|&rank| rank != here) {
+        let list = arrived.remove(&rank).unwrap_or_default();
+        let mut records = list.chunks_exact(words).peekable();
+        for body in 0..seeding.bodies() {
+            seeding.append(points, body, Share { rank, ranks: world.size() }, wanted);
+            while let Some(record) = records.next_if(|r| Points::<D>::body_of(r) == body) {
+                points.unpack(record);
+            }
         }
     }
-    sort_by_cell(points, &cells, (moved > 0).then_some(kept));
-    Ok(moved)
+    let made = points.len() - own;
+    let located = append_cells(grid, points, &mut cells);
+    // A point that lies in another cell than the one it was made for is sent after all.
+    let strays = located.is_err() || cells[own..].iter().any(|&cell| !wanted(cell));
+    let complete = world.sum_usize(made) == world.sum_usize(leaving.len());
+    if world.any(strays) || !complete {
+        points.truncate(own);
+        cells.truncate(own);
+        return migrate_from(world, partition, grid, points, cells);
+    }
+    sort_by_cell(points, &cells, Some(staying(own, points.len(), &leaving)));
+    Ok(world.sum_usize(leaving.len()))
+}
+
+/// The points that stay of `own`, and those that came after them.
+fn staying(own: usize, all: usize, leaving: &[(usize, usize)]) -> Vec<usize> {
+    let mut gone = leaving.iter().map(|&(p, _)| p).peekable();
+    (0..own).filter(|p| gone.next_if_eq(p).is_none()).chain(own..all).collect()
+}
+
+/// The cells of the points beyond those that are known.
+fn append_cells<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    cells: &mut Vec<usize>,
+) -> Result<()> {
+    let known = cells.len();
+    for (k, cell) in grid.locate_each(points.position[known..].iter()).enumerate() {
+        cells.push(cell.ok_or_else(|| outside(points, known + k))?);
+    }
+    Ok(())
 }
 
 /// The points in cells of other ranks, ascending, with those ranks.
@@ -94,8 +168,10 @@ pub fn locate<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
 ) -> Result<Vec<usize>> {
-    let cells = (0..points.len())
-        .map(|p| grid.locate(&points.position[p]).ok_or_else(|| outside(points, p)))
+    let cells = grid
+        .locate_each(points.position.iter())
+        .enumerate()
+        .map(|(p, cell)| cell.ok_or_else(|| outside(points, p)))
         .collect();
     world.fail_together(cells)
 }

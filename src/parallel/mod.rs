@@ -28,7 +28,7 @@ pub mod world;
 
 pub use exchange::exchange;
 pub use halo::HaloPlan;
-pub use migrate::migrate;
+pub use migrate::{migrate, settle};
 pub use partition::Partition;
 pub use traffic::Traffic;
 pub use world::World;

@@ -57,7 +57,17 @@ impl<const D: usize> Partition<D> {
         points: &Points<D>,
         costs: Option<&[f64]>,
     ) -> Result<Self> {
-        let cells = super::migrate::locate(world, grid, points)?;
+        Self::for_cells(world, grid, brick, &super::migrate::locate(world, grid, points)?, costs)
+    }
+
+    /// As [`Self::build`] for points known to be in these cells. Collective.
+    pub fn for_cells(
+        world: &World,
+        grid: &Grid<D>,
+        brick: Option<usize>,
+        cells: &[usize],
+        costs: Option<&[f64]>,
+    ) -> Result<Self> {
         #[allow(unreachable_patterns)]
         let units = match grid {
             Grid::Lattice(lattice) => {
@@ -70,20 +80,20 @@ impl<const D: usize> Partition<D> {
             _ => Units::Cells(CellGraph::of(grid)),
         };
         let mut partition = Partition { units, owner: Vec::new() };
-        partition.assign(world, grid, &cells, costs)?;
+        partition.assign(world, grid, cells, costs)?;
         Ok(partition)
     }
 
     /// Equal slices of the grid, wherever the points are: along x on a lattice, by the numbers
     /// of its cells on a mesh. Where to start from to see a run balance itself. Collective.
-    /// Errors: as [`Self::build`].
+    /// Errors: as [`Self::for_cells`].
     pub fn slabs(
         world: &World,
         grid: &Grid<D>,
         brick: Option<usize>,
-        points: &Points<D>,
+        cells: &[usize],
     ) -> Result<Self> {
-        let mut partition = Self::build(world, grid, brick, points, None)?;
+        let mut partition = Self::for_cells(world, grid, brick, cells, None)?;
         let (units, ranks) = (partition.unit_count(), world.size());
         partition.owner = (0..units)
             .map(|unit| match &partition.units {

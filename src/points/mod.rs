@@ -65,6 +65,18 @@ macro_rules! point_fields {
                 } )*
             }
 
+            /// Body of a packed point.
+            pub fn body_of(words: &[f64]) -> usize {
+                words[1].to_bits() as usize
+            }
+
+            /// Drops all points but the first `count`.
+            pub fn truncate(&mut self, count: usize) {
+                self.id.truncate(count);
+                self.body.truncate(count);
+                $( self.$name.truncate(count); )*
+            }
+
             /// Keeps the points `order[0], order[1], ...` in that order and drops the others.
             pub fn select(&mut self, order: &[usize]) {
                 let mut gather = Gather::new(order);

@@ -105,15 +105,18 @@ impl<const D: usize> Slice<D> {
     }
 }
 
-/// Makes this rank's share of all bodies' points, unstrained, with their initial velocity.
-pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result<Points<D>> {
+/// Makes this rank's share of all bodies' points, unstrained, with their initial velocity. Beside
+/// them the identity of each body's first candidate, the same on every rank.
+pub fn seed<const D: usize>(
+    deck: &Deck,
+    grid: &Grid<D>,
+    share: Share,
+) -> Result<(Points<D>, Vec<u64>)> {
     let mut points = Points::of_basis(deck.method.basis);
-    let mut first_id = 0u64;
-    // The position of a CPDI2 point is the centroid of its domain; others sit where their
-    // sub-cell's centre maps to.
-    let at_centroid = deck.method.basis == Basis::Cpdi2;
+    let (mut first_id, mut first_ids) = (0u64, Vec::with_capacity(deck.bodies.len()));
     for (index, body) in deck.bodies.iter().enumerate() {
         let made = points.len();
+        first_ids.push(first_id);
         let candidates = match (&body.source, grid) {
             (BodySource::File(path), _) => {
                 super::file::read_points(&mut points, index, body, path, share, first_id)?
@@ -130,20 +133,11 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
                 within_lattice(body, shape, &counts, lattice, share)?;
                 per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
             }
-            (BodySource::Shape { shape, seeding }, Grid::Mesh(mesh)) => {
-                let cells: Vec<usize> = (0..mesh.cell_count()).collect();
-                let inside = |x: &[f64; D]| shape.contains(x);
-                let seeding = CellSeeding { mesh, cells: &cells, seeding, at_centroid };
-                seeding.run(&mut points, index, body, inside, share, first_id)
-            }
-            (BodySource::MeshCells { tag, seeding }, Grid::Mesh(mesh)) => {
-                let cells = match tag {
-                    Some(tag) => mesh.tagged_cells(tag)?,
-                    None => (0..mesh.cell_count()).collect(),
-                };
-                let all = |_: &[f64; D]| true;
-                let seeding = CellSeeding { mesh, cells: &cells, seeding, at_centroid };
-                seeding.run(&mut points, index, body, all, share, first_id)
+            (BodySource::Shape { seeding, .. }, Grid::Mesh(mesh))
+            | (BodySource::MeshCells { seeding, .. }, Grid::Mesh(mesh)) => {
+                let cells = CellSeeding::new(deck, mesh, index, seeding)?;
+                cells.run(&mut points, share, |_| true, first_id);
+                cells.candidates()
             }
             (BodySource::MeshCells { .. }, Grid::Lattice(_)) => {
                 return Err(Error::Input(format!(
@@ -156,7 +150,55 @@ pub fn seed<const D: usize>(deck: &Deck, grid: &Grid<D>, share: Share) -> Result
         first_id += candidates;
         set_velocity(&mut points, made, body);
     }
-    Ok(points)
+    Ok((points, first_ids))
+}
+
+/// Makes any points of the bodies that are seeded cell by cell on a mesh.
+pub struct CellByCell<'a, const D: usize> {
+    bodies: Vec<Option<CellSeeding<'a, D>>>,
+    first_ids: Vec<u64>,
+}
+
+impl<'a, const D: usize> CellByCell<'a, D> {
+    /// `first_ids` as [`seed`] tells.
+    pub fn new(deck: &'a Deck, grid: &'a Grid<D>, first_ids: Vec<u64>) -> Result<Self> {
+        let of = |(index, body): (usize, &'a Body)| match (&body.source, grid) {
+            (BodySource::Shape { seeding: Seeding::Lattice { .. }, .. }, _)
+            | (BodySource::File(_), _)
+            | (_, Grid::Lattice(_)) => Ok(None),
+            (BodySource::Shape { seeding, .. }, Grid::Mesh(mesh))
+            | (BodySource::MeshCells { seeding, .. }, Grid::Mesh(mesh)) => {
+                CellSeeding::new(deck, mesh, index, seeding).map(Some)
+            }
+        };
+        let bodies = deck.bodies.iter().enumerate().map(of).collect::<Result<_>>()?;
+        Ok(CellByCell { bodies, first_ids })
+    }
+
+    pub fn bodies(&self) -> usize {
+        self.bodies.len()
+    }
+
+    /// Whether it makes the points of a body.
+    pub fn makes(&self, body: usize) -> bool {
+        self.bodies[body].is_some()
+    }
+
+    /// Appends the points of a body that [`seed`] makes for `share` in the cells that are
+    /// `wanted`, in its order.
+    pub fn append(
+        &self,
+        points: &mut Points<D>,
+        body: usize,
+        share: Share,
+        wanted: impl Fn(usize) -> bool,
+    ) {
+        if let Some(cells) = &self.bodies[body] {
+            let made = points.len();
+            cells.run(points, share, wanted, self.first_ids[body]);
+            set_velocity(points, made, cells.body);
+        }
+    }
 }
 
 /// An error where the seeding, carried on beyond the lattice (as far again on each side), would
@@ -249,47 +291,86 @@ fn per_cell<const D: usize>(
 /// the mesh's own.
 struct CellSeeding<'a, const D: usize> {
     mesh: &'a Mesh<D>,
-    cells: &'a [usize],
+    index: usize,
+    body: &'a Body,
     seeding: &'a Seeding,
+    /// Where in these cells; everywhere without a shape.
+    shape: Option<&'a Shape>,
+    cells: Vec<usize>,
     at_centroid: bool,
 }
 
-impl<const D: usize> CellSeeding<'_, D> {
-    /// Makes the points that are inside; returns the number of candidates.
-    fn run(
-        &self,
-        points: &mut Points<D>,
+impl<'a, const D: usize> CellSeeding<'a, D> {
+    fn new(
+        deck: &'a Deck,
+        mesh: &'a Mesh<D>,
         index: usize,
-        body: &Body,
-        inside: impl Fn(&[f64; D]) -> bool,
-        share: Share,
-        first_id: u64,
-    ) -> u64 {
-        // No element makes more than six times n^D sub-cells of one cell.
+        seeding: &'a Seeding,
+    ) -> Result<CellSeeding<'a, D>> {
+        let body = &deck.bodies[index];
+        let (shape, tag) = match &body.source {
+            BodySource::Shape { shape, .. } => (Some(shape), None),
+            BodySource::MeshCells { tag, .. } => (None, tag.as_deref()),
+            BodySource::File(_) => unreachable!("a file tells where its points are"),
+        };
+        let cells = match tag {
+            Some(tag) => mesh.tagged_cells(tag)?,
+            None => (0..mesh.cell_count()).collect(),
+        };
+        // The position of a CPDI2 point is the centroid of its domain; others sit where their
+        // sub-cell's centre maps to.
+        let at_centroid = deck.method.basis == Basis::Cpdi2;
+        Ok(CellSeeding { mesh, index, body, seeding, shape, cells, at_centroid })
+    }
+
+    /// Room for the candidates of a cell: no element makes more than six times n^D sub-cells.
+    fn per_cell(&self) -> usize {
         let n = match self.seeding {
             Seeding::PerCell(counts) => counts.iter().copied().max().unwrap_or(1),
             Seeding::Gauss(order) => *order,
             Seeding::Lattice { .. } => unreachable!("a lattice of points is seeded by its shape"),
         };
-        let per_cell = 6 * n.pow(D as u32);
+        6 * n.pow(D as u32)
+    }
+
+    fn candidates(&self) -> u64 {
+        (self.cells.len() * self.per_cell()) as u64
+    }
+
+    /// Makes the points that are inside, in the cells of the share that are wanted.
+    fn run(
+        &self,
+        points: &mut Points<D>,
+        share: Share,
+        wanted: impl Fn(usize) -> bool,
+        first_id: u64,
+    ) {
+        let per_cell = self.per_cell();
+        let candidates =
+            || share.of(self.cells.len()).filter(|&candidate| wanted(self.cells[candidate]));
         let mut made = Vec::new();
-        for candidate in share.of(self.cells.len()) {
+        if let (None, Some(first)) = (self.shape, candidates().next()) {
+            // All cells make as many.
+            self.split(self.cells[first], &mut made);
+            points.reserve(candidates().count() * made.len());
+        }
+        for candidate in candidates() {
             made.clear();
             self.split(self.cells[candidate], &mut made);
             for (sub, part) in made.iter().enumerate() {
                 let x = if self.at_centroid { part.centroid } else { part.position };
-                if !inside(&x) {
+                if self.shape.is_some_and(|shape| !shape.contains(&x)) {
                     continue;
                 }
                 let half = [0.5 * part.volume.powf(1.0 / D as f64); D];
-                let id = first_id + (candidate * per_cell + sub) as u64;
-                points.push_unstrained(id, index as u32, x, part.volume, body.density, half);
+                let (id, density) =
+                    (first_id + (candidate * per_cell + sub) as u64, self.body.density);
+                points.push_unstrained(id, self.index as u32, x, part.volume, density, half);
                 if let Some(corners) = points.corners.last_mut() {
                     *corners = part.corners;
                 }
             }
         }
-        (self.cells.len() * per_cell) as u64
     }
 
     fn split(&self, cell: usize, out: &mut Vec<SubCell<D>>) {

@@ -80,6 +80,8 @@ fn two_copies(deck: &Path, sets: &[&str]) -> [Summary; 2] {
 
 fn run_in(folder: &str, ranks: usize, deck: &Path, sets: &[&str]) -> Summary {
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(folder);
+    // Removing the last run's files is not part of this one.
+    std::fs::remove_dir_all(&out).or_else(|_| std::fs::create_dir_all(&out)).expect("a folder");
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("jobs/mpirun.sh");
     let mut command = Command::new("sh");
     command.arg(script).arg(ranks.to_string()).arg(env!("CARGO_BIN_EXE_mpm-par")).arg(deck);

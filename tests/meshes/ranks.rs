@@ -5,7 +5,10 @@ use mpm_par::analysis::setup;
 use mpm_par::basis;
 use mpm_par::deck::model::{Basis, MeshMotion};
 use mpm_par::grid::Grid;
-use mpm_par::parallel::World;
+use mpm_par::parallel::migrate::{locate, migrate_from};
+use mpm_par::parallel::{Partition, World};
+use mpm_par::points::Points;
+use mpm_par::points::seed::{CellByCell, Share, seed};
 use mpm_par::{deck, parallel};
 
 use crate::common::on_ranks;
@@ -97,7 +100,7 @@ fn a_partition_may_cut_domains() {
             let mut cut = 0;
             for p in 0..points.len() {
                 let mut cells = Vec::new();
-                basis::populated_cells(&model.grid, basis, &points, p, &mut cells).unwrap();
+                basis::populated_cells(&model.grid, basis, &points, p, None, &mut cells).unwrap();
                 let elsewhere = |&cell: &usize| {
                     model.partition.owner_of_cell(&model.grid, cell) != world.rank()
                 };
@@ -123,6 +126,49 @@ fn a_partition_may_cut_domains() {
                 for a in 0..2 {
                     assert!((x[a] - points.position[p][a]).abs() < 1e-9, "{x:?}");
                 }
+            }
+        }
+    });
+}
+
+/// Points that change rank at the start are made anew where they arrive: the same as if they had been
+/// sent, in the same order, beside those of a file, which are sent. On a mesh turned since, where they
+/// would be other points, all are sent.
+#[test]
+fn points_made_where_they_arrive_are_those_that_would_be_sent() {
+    const NAME: &str = "ranks::points_made_where_they_arrive_are_those_that_would_be_sent";
+    on_ranks(NAME, &[1, 2, 3], |universe| {
+        let world = World::new(mpi::topology::Communicator::duplicate(&universe.world()));
+        let path = input("doughnut-10");
+        let text = std::fs::read_to_string(&path).unwrap();
+        let share = Share { rank: world.rank(), ranks: world.size() };
+        let words = |points: &Points<2>| {
+            let mut words = Vec::new();
+            (0..points.len()).for_each(|p| points.pack(p, &mut words));
+            words.into_iter().map(f64::to_bits).collect::<Vec<u64>>()
+        };
+        for basis in ["mpm", "cpdi2"] {
+            let sets = [format!("method.basis=\"{basis}\"")];
+            let deck = deck::read(&path, &text, &sets).unwrap();
+            let grid = setup::build_grid::<2>(&deck).unwrap();
+            let mut turned = grid.clone();
+            let Grid::Mesh(mesh) = &mut turned else { panic!("a mesh") };
+            let turn = Some(([0.0; 2], 7f64.to_radians()));
+            mesh.advance(&MeshMotion::RotateWith("inner".into()), |_| None, turn).unwrap();
+            for after in [&grid, &turned] {
+                let (mut points, first_ids) = seed(&deck, &grid, share).unwrap();
+                let seeding = CellByCell::new(&deck, &grid, first_ids).unwrap();
+                assert!(seeding.makes(0) && !seeding.makes(1), "cells and a file");
+                let cells = locate(&world, after, &points).unwrap();
+                let partition = Partition::for_cells(&world, after, None, &cells, None).unwrap();
+                let mut sent = points.clone();
+                let moved =
+                    migrate_from(&world, &partition, after, &mut sent, cells.clone()).unwrap();
+                assert_eq!(moved > 0, world.size() > 1, "something has to move");
+                let settled =
+                    parallel::settle(&world, &partition, after, &mut points, cells, &seeding);
+                assert_eq!(settled.unwrap(), moved);
+                assert!(words(&points) == words(&sent), "{basis}");
             }
         }
     });
