@@ -85,7 +85,9 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         } else {
             let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
             Method::Iterative(Box::new(Start {
-                preconditioner: Incomplete::factor(world, matrix, numbering, pattern, &diagonal),
+                preconditioner: Incomplete::factor(
+                    world, grid, matrix, numbering, pattern, &diagonal,
+                ),
                 inverse_row_sum: mass::row_sums(matrix, pattern, rows)
                     .iter()
                     .map(one_over)

@@ -23,6 +23,7 @@
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 
 pub mod conditions;
+mod elimination;
 pub mod envelope;
 pub mod external;
 pub mod graph;
