@@ -36,8 +36,8 @@ mod tests {
         let marks = [true, true, false, true, false, false];
         let border = Border::new(marks.into_iter());
         assert_eq!((border.reaching, border.inner), (vec![0..2, 3..4], vec![2..3, 4..6]));
-        assert_eq!(Border::new([false; 3].into_iter()).inner, [0..3]);
-        assert_eq!(Border::new([true; 3].into_iter()).inner, []);
+        assert_eq!(Border::new([false; 3].into_iter()).inner[0], 0..3);
+        assert!(Border::new([true; 3].into_iter()).inner.is_empty());
         assert_eq!(Border::new(std::iter::empty()), Border::default());
     }
 }

@@ -298,7 +298,7 @@ impl Incomplete {
 
 #[cfg(test)]
 mod tests {
-    use super::Incomplete;
+    use super::{Incomplete, Order};
     use crate::assembly::node_index::NodeIndex;
     use crate::assembly::{BlockMatrix, Numbering, Pattern};
     use crate::parallel::HaloPlan;
