@@ -1,4 +1,4 @@
-//! The order in which a rank eliminates its nodes: inner ones first, on a lattice along its axes
+//! The order in which a rank eliminates its nodes: inner ones first, on a plane lattice along its axes
 //! towards the border with other ranks; the border last, ascending.
 //!
 //! The mass of evenly spread points is a Kronecker product over the axes, and the factor of a
@@ -21,7 +21,7 @@ pub struct Order {
 }
 
 impl Order {
-    /// Meshes have no axes: ascending there.
+    /// Meshes have no axes: ascending there, and in space.
     pub fn new<const D: usize>(grid: &Grid<D>, numbering: &Numbering, pattern: &Pattern) -> Self {
         let owned = numbering.owned;
         let foreign = |row: u32| {
@@ -31,7 +31,10 @@ impl Order {
         let (border, mut nodes): (Vec<u32>, Vec<u32>) =
             (0..owned as u32).partition(|&node| foreign(node).next().is_some());
         let inner = nodes.len();
-        if let Grid::Lattice(lattice) = grid {
+        // In space the borders are too frayed for it to gain, and pic in the stretch loses digits.
+        if D == 2
+            && let Grid::Lattice(lattice) = grid
+        {
             let of = |node: u32| numbering.nodes[node as usize];
             let pairs = border
                 .iter()
