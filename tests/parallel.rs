@@ -107,6 +107,27 @@ fn halo_copies_and_adds_in_order() {
                     assert_eq!(values[(per_rank + g) * block + c], value(key, c));
                 }
             }
+            // The same while other work goes on, two arrays in one message.
+            let mut fields = [values.clone(), values.iter().map(|v| 3.0 * v).collect()];
+            for field in &mut fields {
+                field[per_rank * block..].fill(-1.0);
+            }
+            let [one, two] = &mut fields;
+            let sum = plan.forward_while(&world, [one, two], block, |[one, _]| {
+                one[..per_rank * block].iter().sum::<f64>()
+            });
+            assert_eq!(sum, values[..per_rank * block].iter().sum::<f64>());
+            assert_eq!(fields[0], values);
+            assert!(fields[1].iter().zip(&values).all(|(a, b)| *a == 3.0 * b));
+            let [mut plain, mut other] = fields.clone();
+            plain[..per_rank * block].iter_mut().for_each(|v| *v += 1.0);
+            plan.reverse_add(&world, &mut plain, block).unwrap();
+            plan.reverse_add(&world, &mut other, block).unwrap();
+            let [one, two] = &mut fields;
+            plan.reverse_add_while(&world, [one, two], block, |[one, _]| {
+                one[..per_rank * block].iter_mut().for_each(|v| *v += 1.0);
+            });
+            assert_eq!(fields, [plain, other]);
             // Sums whose rounding depends on the order repeat bit by bit.
             let mut first: Option<Vec<f64>> = None;
             for _ in 0..20 {

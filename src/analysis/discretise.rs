@@ -1,5 +1,6 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
+use crate::assembly::border::Border;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::internal::StepPoints;
 use crate::assembly::manufactured::Manufactured;
@@ -60,6 +61,8 @@ pub struct Discretisation<const D: usize> {
     pub groups: Groups,
     /// Local node of each entry of `groups.nodes`.
     pub group_nodes: Vec<u32>,
+    /// Points that touch ghosts, and the others.
+    pub border: Border,
     pub populated: Populated,
     /// Faces owned here.
     pub faces: Vec<FaceStencil>,
@@ -165,6 +168,14 @@ impl<const D: usize> Discretisation<D> {
             nodes.iter().filter_map(|&node| numbering.local(node).map(|i| i as u32)).collect()
         };
         let group_nodes = locals(&groups.nodes);
+        let group_reaches: Vec<bool> = groups
+            .node_offsets
+            .windows(2)
+            .map(|range| {
+                group_nodes[range[0]..range[1]].iter().any(|&n| n as usize >= numbering.owned)
+            })
+            .collect();
+        let border = Border::new(groups.group_of_point.iter().map(|&group| group_reaches[group]));
         let mut node_grip = vec![0.0; numbering.len()];
         if coupling == Coupling::Matrix {
             let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
@@ -194,6 +205,7 @@ impl<const D: usize> Discretisation<D> {
             influences,
             groups,
             group_nodes,
+            border,
             populated,
             faces,
             numbering,

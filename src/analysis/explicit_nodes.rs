@@ -15,7 +15,8 @@ use crate::tensor::Square;
 use super::clock::Clock;
 use super::discretise::{Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
-use super::mapping;
+use super::mapping::{self, Pushed};
+use super::nodal_sums::{over_points, to_points};
 use super::transport::Carrier;
 use super::update::{self, PointEnergies, Refusal};
 
@@ -56,7 +57,7 @@ pub(super) struct Nodes<'a, const D: usize> {
     pub seconds: f64,
 }
 
-/// Nodal force with the shares of all ranks, N, and acceleration, m/s2.
+/// Nodal force with the shares of all ranks, N, and acceleration, m/s2; at ghosts without meaning.
 pub(super) struct Forces<const D: usize> {
     pub pushed: Vec<[f64; D]>,
     pub acceleration: Vec<f64>,
@@ -102,35 +103,35 @@ impl<'a, const D: usize> Nodes<'a, D> {
     }
 
     /// v of Ghost eq. 10, sharpened if the deck says so, and the forces where the stress is
-    /// updated last: one pass over the points and one iteration then give both. Collective.
+    /// updated last: one pass over the points and one iteration then give both. Without forces v
+    /// has values at ghosts. Collective.
     pub fn velocity_and_forces(
         &mut self,
         points: &Points<D>,
         clock: &mut Clock,
     ) -> Result<(Vec<f64>, Option<Forces<D>>)> {
         let step = self.mesh.step_points(points, &self.model.materials);
-        let (count, method) = (self.mesh.numbering.len(), &self.model.deck.method);
+        let method = &self.model.deck.method;
         let (mut velocity, forces) = if method.stress_update == StressUpdate::Usf {
-            let momentum = || Ok(mapping::momentum(step, &points.velocity, count));
-            let momentum = clock.time(Phase::Assemble, momentum)?;
-            let velocity = self.solve(momentum)?;
-            (velocity, None)
+            let momentum =
+                clock.time(Phase::Assemble, || Ok(self.momentum(step, &points.velocity)))?;
+            (self.solve(&momentum, None)?, None)
         } else {
-            let (momentum, force) = clock.time(Phase::Assemble, || {
-                Ok(mapping::momentum_and_force(step, self.external, count))
+            let [momentum, pushed] = clock.time(Phase::Assemble, || {
+                Ok(over_points(self.world, self.mesh, |part, [momenta, forces]| {
+                    mapping::add_momentum_and_force(step, part, self.external, momenta, forces);
+                }))
             })?;
-            let pushed = self.summed_and_carried(force)?;
+            self.require_mass(&pushed)?;
             let prescribed: [&[f64]; 2] = [&self.held_velocity, &self.at_rest];
             let [velocity, acceleration] = timed(&mut self.seconds, || {
-                let momentum = self.inverse.summed(momentum)?;
                 self.inverse.solve_two([&momentum, &pushed], prescribed)
             })?;
             (velocity, Some(Forces { pushed, acceleration }))
         };
         if let Some(order) = method.xpic {
-            velocity = timed(&mut self.seconds, || {
-                sharpen(&mut self.inverse, step, velocity, order, &self.at_rest, count)
-            })?;
+            self.mesh.numbering.halo.forward(self.world, &mut velocity, D)?;
+            velocity = self.sharpen(step, velocity, order)?;
         }
         Ok((velocity, forces))
     }
@@ -143,12 +144,30 @@ impl<'a, const D: usize> Nodes<'a, D> {
         clock: &mut Clock,
     ) -> Result<Forces<D>> {
         let step = self.mesh.step_points(points, &self.model.materials);
-        let count = self.mesh.numbering.len();
-        let sum = || Ok(mapping::force(step, self.external, deformation, count));
-        let pushed = self.summed_and_carried(clock.time(Phase::Assemble, sum)?)?;
+        let [pushed] = clock.time(Phase::Assemble, || {
+            Ok(over_points(self.world, self.mesh, |part, [forces]| {
+                mapping::add_force(step, part, self.external, deformation, forces);
+            }))
+        })?;
+        self.require_mass(&pushed)?;
         let acceleration =
             timed(&mut self.seconds, || self.inverse.solve_summed(&pushed, &self.at_rest, None))?;
         Ok(Forces { pushed, acceleration })
+    }
+
+    /// Brings v' and a to the ghosts, and both to the points. Collective.
+    pub fn push(
+        &self,
+        step: StepPoints<'_, D>,
+        velocity: &mut [f64],
+        acceleration: &mut [f64],
+    ) -> Pushed<D> {
+        let (flip, dt) = (self.model.deck.method.flip, self.dt);
+        let mut pushed = Pushed::zeros(step.points.len());
+        to_points(self.world, self.mesh, [velocity, acceleration], |part, nodal| {
+            pushed.push(step, part, nodal, flip, dt);
+        });
+        pushed
     }
 
     /// Updates the stress first, with the nodal `velocity` at the step's start: dF of the points,
@@ -163,7 +182,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let flip = self.model.deck.method.flip;
         let mut deforming = if carrier == Carrier::RemappedBack && flip < 1.0 {
             let shared = blend(flip, &points.velocity, &mapping::at_points(step, velocity));
-            self.solve(mapping::momentum(step, &shared, self.mesh.numbering.len()))?
+            self.solve(&self.momentum(step, &shared), None)?
         } else {
             velocity.to_vec()
         };
@@ -191,10 +210,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let mut moving = velocity.to_vec();
         let mut again = None;
         if carrier.needs_solve() || musl {
-            let sums = mapping::momentum(step, new_velocity, self.mesh.numbering.len());
-            let solved = timed(&mut self.seconds, || {
-                self.inverse.solve_near(sums, &self.held_velocity, velocity)
-            })?;
+            let solved = self.solve(&self.momentum(step, new_velocity), Some(velocity))?;
             if carrier.needs_solve() {
                 moving.clone_from(&solved);
             }
@@ -212,17 +228,54 @@ impl<'a, const D: usize> Nodes<'a, D> {
         Ok(Motion { moved: over_step(moving), again: again.map(over_step) })
     }
 
-    /// M~^-1 of sums of this rank's points, with the boundaries' velocity. Collective.
-    fn solve(&mut self, sums: Vec<[f64; D]>) -> Result<Vec<f64>> {
-        timed(&mut self.seconds, || self.inverse.solve(sums, &self.held_velocity))
+    /// Σ_p m S^T v at the owned nodes. Collective.
+    fn momentum(&self, step: StepPoints<'_, D>, velocity: &[[f64; D]]) -> Vec<[f64; D]> {
+        let [momentum] = over_points(self.world, self.mesh, |part, [momenta]| {
+            mapping::add_momentum(step, part, velocity, momenta);
+        });
+        momentum
     }
 
-    /// The force with the shares of all ranks; what is pushed must have mass. Collective.
-    fn summed_and_carried(&self, force: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
-        let pushed = self.inverse.summed(force)?;
+    /// M~^-1 of sums at the owned nodes, with the boundaries' velocity, at all local nodes; from a
+    /// `guess` near it if there is one. Collective.
+    fn solve(&mut self, sums: &[[f64; D]], guess: Option<&[f64]>) -> Result<Vec<f64>> {
+        timed(&mut self.seconds, || {
+            let mut x = self.inverse.solve_summed(sums, &self.held_velocity, guess)?;
+            self.mesh.numbering.halo.forward(self.world, &mut x, D)?;
+            Ok(x)
+        })
+    }
+
+    /// What is pushed must have mass. Collective.
+    fn require_mass(&self, pushed: &[[f64; D]]) -> Result<()> {
         let (grid, held) = (&self.model.grid, &self.conditions.fixed);
-        require_mass(self.world, grid, self.mesh, self.mass, held, &pushed)?;
-        Ok(pushed)
+        require_mass(self.world, grid, self.mesh, self.mass, held, pushed)
+    }
+
+    /// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the
+    /// consistent mass, with S+ v_p = M^-1 Σ m S^T v_p by the lumped mass. Local values in, owned
+    /// ones and ghosts; so returned. Collective.
+    fn sharpen(
+        &mut self,
+        step: StepPoints<'_, D>,
+        velocity: Vec<f64>,
+        order: usize,
+    ) -> Result<Vec<f64>> {
+        let mut sum = velocity.clone();
+        let mut term = velocity;
+        for _ in 1..order {
+            let back = mapping::at_points(step, &term);
+            let momentum = self.momentum(step, &back);
+            let mut mapped = timed(&mut self.seconds, || {
+                self.inverse.solve_summed(&momentum, &self.at_rest, None)
+            })?;
+            self.mesh.numbering.halo.forward(self.world, &mut mapped, D)?;
+            for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
+                *t -= m;
+                *s += *t;
+            }
+        }
+        Ok(sum)
     }
 }
 
@@ -240,27 +293,4 @@ fn blend<const D: usize>(share: f64, a: &[[f64; D]], b: &[[f64; D]]) -> Vec<[f64
         .zip(b)
         .map(|(a, b)| std::array::from_fn(|i| share * a[i] + (1.0 - share) * b[i]))
         .collect()
-}
-
-/// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the
-/// consistent mass, with S+ v_p = M^-1 Σ m S^T v_p by the lumped mass.
-fn sharpen<const D: usize>(
-    inverse: &mut Inverse<'_, D>,
-    step: StepPoints<'_, D>,
-    velocity: Vec<f64>,
-    order: usize,
-    at_rest: &[f64],
-    nodes: usize,
-) -> Result<Vec<f64>> {
-    let mut sum = velocity.clone();
-    let mut term = velocity;
-    for _ in 1..order {
-        let back = mapping::at_points(step, &term);
-        let mapped = inverse.solve(mapping::momentum(step, &back, nodes), at_rest)?;
-        for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
-            *t -= m;
-            *s += *t;
-        }
-    }
-    Ok(sum)
 }

@@ -18,7 +18,7 @@ use super::discretise::{Coupling, Discretisation, Model};
 use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
 use super::grid_mass::GridMass;
 use super::ledger::StepSums;
-use super::mapping;
+use super::mapping::{self, Pushed};
 use super::reactions::{at_held, reactions};
 use super::step_end::Solved;
 use super::transport::{self, Carrier};
@@ -61,7 +61,7 @@ pub(super) fn advance<const D: usize>(
         StressUpdate::Usf => Some(nodes.deform_first(carrier, &velocity, points)?),
         StressUpdate::Usl | StressUpdate::Musl => None,
     };
-    let Forces { pushed, acceleration } = match (forces, &first) {
+    let Forces { pushed, mut acceleration } = match (forces, &first) {
         (Some(forces), _) => forces,
         (None, first) => {
             let deformation = first.as_ref().map_or(&[][..], |(deformation, _)| deformation);
@@ -72,9 +72,8 @@ pub(super) fn advance<const D: usize>(
         *v += dt * a;
     }
     let step = mesh.step_points(points, &model.materials);
-    let (rate, new_velocity) = clock.time(Phase::Update, || {
-        Ok(mapping::push(step, &acceleration, &velocity, method.flip, dt))
-    })?;
+    let Pushed { rate, velocity: new_velocity } =
+        clock.time(Phase::Update, || Ok(nodes.push(step, &mut velocity, &mut acceleration)))?;
     let Motion { moved, again } =
         nodes.motion(carrier, step, &new_velocity, &velocity, &acceleration)?;
     let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();

@@ -10,11 +10,12 @@ use crate::parallel::World;
 
 use super::discretise::Discretisation;
 use super::equilibrium::ghost_matrix;
+use super::nodal_sums::over_points;
 use crate::assembly::internal::StepPoints;
 
 /// Mass of the active nodes of one step.
 pub enum GridMass {
-    /// Per local node, complete on owners and ghosts, kg.
+    /// Per local node, complete at owned ones, kg.
     Lumped(Vec<f64>),
     Consistent {
         /// M~ = M + gamma_M J in its owners' rows.
@@ -32,13 +33,12 @@ impl GridMass {
         step: StepPoints<'_, D>,
         kind: Mass,
     ) -> Result<Self> {
-        let numbering = &mesh.numbering;
         match kind {
             Mass::Lumped => {
-                let mut mass = mass::lumped(step, numbering.len());
-                numbering.halo.reverse_add(world, &mut mass, 1)?;
-                numbering.halo.forward(world, &mut mass, 1)?;
-                Ok(GridMass::Lumped(mass))
+                let [mass] = over_points(world, mesh, |part, [mass]: [&mut [[f64; 1]]; 1]| {
+                    mass::add_lumped(step, part, mass.as_flattened_mut());
+                });
+                Ok(GridMass::Lumped(mass.into_flattened()))
             }
             Mass::Consistent => {
                 let mut matrix = mass::consistent(world, step, &mesh.pattern)?;
@@ -137,27 +137,18 @@ impl<const D: usize> Inverse<'_, D> {
     /// points, sent to their owners here. Returns local values. Collective.
     pub fn solve(&mut self, sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
         let sums = self.summed(sums)?;
-        self.solve_summed(&sums, prescribed, None)
-    }
-
-    /// [`Self::solve`] where x is near `guess` (local): iterations start there. Collective.
-    pub fn solve_near(
-        &mut self,
-        sums: Vec<[f64; D]>,
-        prescribed: &[f64],
-        guess: &[f64],
-    ) -> Result<Vec<f64>> {
-        let sums = self.summed(sums)?;
-        self.solve_summed(&sums, prescribed, Some(guess))
+        let mut x = self.solve_summed(&sums, prescribed, None)?;
+        self.mesh.numbering.halo.forward(self.world, &mut x, D)?;
+        Ok(x)
     }
 
     /// Nodal sums of this rank's points with those of the others, at the owned nodes. Collective.
-    pub fn summed(&self, mut sums: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
+    fn summed(&self, mut sums: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
         self.mesh.numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
         Ok(sums)
     }
 
-    /// [`Self::solve`] of two right-hand sides at once, both [`Self::summed`].
+    /// [`Self::solve_summed`] for two right-hand sides at once. Collective.
     pub fn solve_two(
         &mut self,
         sums: [&[[f64; D]]; 2],
@@ -171,7 +162,8 @@ impl<const D: usize> Inverse<'_, D> {
         inverse.solve_two(sums.map(|sums| sums[..owned].as_flattened()), prescribed)
     }
 
-    /// [`Self::solve`] of sums that are [`Self::summed`], from a `guess` if there is one.
+    /// [`Self::solve`] for sums over all ranks at the owned nodes, from a `guess` near x if there
+    /// is one. Local values, the ghosts without meaning. Collective.
     pub fn solve_summed(
         &mut self,
         sums: &[[f64; D]],
@@ -194,7 +186,6 @@ impl<const D: usize> Inverse<'_, D> {
                         0.0
                     };
                 }
-                numbering.halo.forward(self.world, &mut x, D)?;
                 Ok(x)
             }
         }

@@ -3,6 +3,8 @@
 //! Nodal arrays hold one value (or vector) per local node; what this rank adds to nodes of
 //! others is not yet sent. Sums run in the order of the points.
 
+use std::ops::Range;
+
 use crate::assembly::internal::StepPoints;
 use crate::tensor::Square;
 use crate::tensor::dense;
@@ -14,8 +16,19 @@ pub fn momentum<const D: usize>(
     nodes: usize,
 ) -> Vec<[f64; D]> {
     let mut sums = vec![[0.0; D]; nodes];
-    for (p, v) in velocity.iter().enumerate() {
-        let carried = v.map(|v| v * step.points.mass[p]);
+    add_momentum(step, 0..step.points.len(), velocity, &mut sums);
+    sums
+}
+
+/// Adds [`momentum`] of some of the points.
+pub fn add_momentum<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    velocity: &[[f64; D]],
+    sums: &mut [[f64; D]],
+) {
+    for p in part {
+        let carried = velocity[p].map(|v| v * step.points.mass[p]);
         let weights = &step.influences.weights[step.influences.row(p)];
         for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
             let sum = &mut sums[node as usize];
@@ -24,7 +37,6 @@ pub fn momentum<const D: usize>(
             }
         }
     }
-    sums
 }
 
 /// Σ_p S^T f - ∇S^T σ V (Ghost eq. 6), N, with σ V = τ V0. `external` is the force on each
@@ -37,8 +49,20 @@ pub fn force<const D: usize>(
     nodes: usize,
 ) -> Vec<[f64; D]> {
     let mut sums = vec![[0.0; D]; nodes];
+    add_force(step, 0..step.points.len(), external, increments, &mut sums);
+    sums
+}
+
+/// Adds [`force`] of some of the points.
+pub fn add_force<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    external: &[[f64; D]],
+    increments: &[Square<D>],
+    sums: &mut [[f64; D]],
+) {
     let points = step.points;
-    for p in 0..points.len() {
+    for p in part {
         let volume = points.volume_initial[p];
         let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
         // Row i of τ V0 dF^-T: what the gradient is multiplied with.
@@ -58,18 +82,18 @@ pub fn force<const D: usize>(
             }
         }
     }
-    sums
 }
 
-/// [`momentum`] and [`force`] in one pass, to the last bit the same.
-pub fn momentum_and_force<const D: usize>(
+/// [`add_momentum`] and [`add_force`] in one pass, to the last bit the same.
+pub fn add_momentum_and_force<const D: usize>(
     step: StepPoints<'_, D>,
+    part: Range<usize>,
     external: &[[f64; D]],
-    nodes: usize,
-) -> (Vec<[f64; D]>, Vec<[f64; D]>) {
-    let (mut momenta, mut forces) = (vec![[0.0; D]; nodes], vec![[0.0; D]; nodes]);
+    momenta: &mut [[f64; D]],
+    forces: &mut [[f64; D]],
+) {
     let points = step.points;
-    for p in 0..points.len() {
+    for p in part {
         let volume = points.volume_initial[p];
         let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
         let flux = stress.map(|row| row.map(|s| s * volume));
@@ -86,44 +110,54 @@ pub fn momentum_and_force<const D: usize>(
             }
         }
     }
-    (momenta, forces)
 }
 
-/// Rates S a and new velocities α (v_p + dt S a) + (1 - α) S v' of the points (Ghost eq. 8);
-/// `acceleration` and `velocity` v' hold `D` values per local node.
-pub fn push<const D: usize>(
-    step: StepPoints<'_, D>,
-    acceleration: &[f64],
-    velocity: &[f64],
-    share: f64,
-    dt: f64,
-) -> (Vec<[f64; D]>, Vec<[f64; D]>) {
-    let count = step.points.len();
-    let (mut rates, mut velocities) = (Vec::with_capacity(count), Vec::with_capacity(count));
-    let of_nodes = share < 1.0;
-    for (p, before) in step.points.velocity.iter().enumerate() {
-        let (mut rate, mut carried) = ([0.0; D], [0.0; D]);
-        let weights = &step.influences.weights[step.influences.row(p)];
-        for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
-            let range = node as usize * D..node as usize * D + D;
-            let a = &acceleration[range.clone()];
-            for i in 0..D {
-                rate[i] += weight * a[i];
-            }
-            if of_nodes {
-                let v = &velocity[range];
+/// Rates S a and velocities of the points.
+pub struct Pushed<const D: usize> {
+    pub rate: Vec<[f64; D]>,
+    pub velocity: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Pushed<D> {
+    pub fn zeros(points: usize) -> Self {
+        Pushed { rate: vec![[0.0; D]; points], velocity: vec![[0.0; D]; points] }
+    }
+
+    /// Rates S a and new velocities α (v_p + dt S a) + (1 - α) S v' of some of the points (Ghost
+    /// eq. 8), α = `share`; `acceleration` and `velocity` v' hold `D` values per local node.
+    pub fn push(
+        &mut self,
+        step: StepPoints<'_, D>,
+        part: Range<usize>,
+        [velocity, acceleration]: [&[f64]; 2],
+        share: f64,
+        dt: f64,
+    ) {
+        let of_nodes = share < 1.0;
+        for p in part {
+            let (mut rate, mut carried) = ([0.0; D], [0.0; D]);
+            let weights = &step.influences.weights[step.influences.row(p)];
+            for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
+                let range = node as usize * D..node as usize * D + D;
+                let a = &acceleration[range.clone()];
                 for i in 0..D {
-                    carried[i] += weight * v[i];
+                    rate[i] += weight * a[i];
+                }
+                if of_nodes {
+                    let v = &velocity[range];
+                    for i in 0..D {
+                        carried[i] += weight * v[i];
+                    }
                 }
             }
+            let before = &step.points.velocity[p];
+            self.rate[p] = rate;
+            self.velocity[p] = std::array::from_fn(|i| {
+                let pushed = before[i] + dt * rate[i];
+                if of_nodes { share * pushed + (1.0 - share) * carried[i] } else { pushed }
+            });
         }
-        rates.push(rate);
-        velocities.push(std::array::from_fn(|i| {
-            let pushed = before[i] + dt * rate[i];
-            if of_nodes { share * pushed + (1.0 - share) * carried[i] } else { pushed }
-        }));
     }
-    (rates, velocities)
 }
 
 /// Σ_v S u at each point; `nodal` holds `D` values per local node.
@@ -206,19 +240,27 @@ mod tests {
                 group_nodes: &group_nodes,
             };
             for external in [&external[..], &[]] {
-                let (momenta, forces) = momentum_and_force(step, external, nodes);
+                let (mut momenta, mut forces) = (vec![[0.0; 2]; nodes], vec![[0.0; 2]; nodes]);
+                for part in [0..17, 17..40] {
+                    add_momentum_and_force(step, part, external, &mut momenta, &mut forces);
+                }
                 assert_eq!(momenta, momentum(step, &points.velocity, nodes));
                 assert_eq!(forces, force(step, external, &[], nodes));
             }
             let (a, v) = (at_points(step, &acceleration), at_points(step, &velocity));
             for share in [1.0, 0.4, 0.0] {
-                let (rates, velocities) = push(step, &acceleration, &velocity, share, 0.01);
-                assert_eq!(rates, a);
+                let mut pushed = Pushed::zeros(points.len());
+                for part in [25..40, 0..25] {
+                    pushed.push(step, part, [&velocity, &acceleration], share, 0.01);
+                }
+                assert_eq!(pushed.rate, a);
                 for p in 0..points.len() {
                     for i in 0..2 {
                         let flip = points.velocity[p][i] + 0.01 * a[p][i];
                         let mixed = share * flip + (1.0 - share) * v[p][i];
-                        assert!((velocities[p][i] - mixed).abs() < 1e-15 * (1.0 + mixed.abs()));
+                        assert!(
+                            (pushed.velocity[p][i] - mixed).abs() < 1e-15 * (1.0 + mixed.abs())
+                        );
                     }
                 }
             }

@@ -45,6 +45,7 @@ pub mod mapping;
 pub mod motion;
 pub mod newmark;
 pub mod newton;
+mod nodal_sums;
 pub mod plan;
 mod process;
 pub mod quasi_static;

@@ -12,9 +12,11 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use crate::error::Result;
+use crate::grid::Grid;
 use crate::parallel::World;
 use crate::parallel::exchange::{receive_list, send_lists};
 
+use super::elimination::Order;
 use super::{BlockMatrix, Numbering, Pattern};
 
 /// A row whose pivot would fall below this share of its diagonal entry stands alone instead.
@@ -59,14 +61,16 @@ fn turn(rank: usize) -> u32 {
 impl Incomplete {
     /// `diagonal`: of the owned rows of `matrix`, not negative; rows where it is zero are left
     /// out. Collective.
-    pub fn factor(
+    pub fn factor<const D: usize>(
         world: &World,
+        grid: &Grid<D>,
         matrix: &BlockMatrix<1>,
         numbering: &Numbering,
         pattern: &Pattern,
         diagonal: &[f64],
     ) -> Self {
-        let mut factor = Incomplete::plan(turn(world.rank()), numbering, pattern);
+        let order = Order::new(grid, numbering, pattern);
+        let mut factor = Incomplete::plan(turn(world.rank()), order, numbering, pattern);
         let places = factor.places(numbering);
         let mut spread = vec![0.0; numbering.len()];
         let (inner, all) = (factor.inner, factor.order.len());
@@ -99,9 +103,9 @@ impl Incomplete {
                     let column = pattern.columns[entry] as usize;
                     places[column] < places[row] && self.inverse_diagonal[column] > 0.0
                 }));
-                // Among inner nodes the columns ascend already.
-                if at >= self.inner {
-                    earlier.sort_unstable_by_key(|&entry| places[pattern.columns[entry] as usize]);
+                let place = |entry: &usize| places[pattern.columns[*entry] as usize];
+                if !earlier.is_sorted_by_key(place) {
+                    earlier.sort_unstable_by_key(place);
                 }
                 self.columns.extend(earlier.iter().map(|&entry| pattern.columns[entry]));
                 self.values.extend(earlier.iter().map(|&entry| matrix.values[entry]));
@@ -118,21 +122,13 @@ impl Incomplete {
         }
     }
 
-    /// The order of elimination, without any entry.
-    fn plan(here: u32, numbering: &Numbering, pattern: &Pattern) -> Self {
-        let owned = numbering.owned;
-        let on_border = |&node: &u32| {
-            let row = pattern.offsets[node as usize]..pattern.offsets[node as usize + 1];
-            pattern.columns[row].iter().any(|&column| column as usize >= owned)
-        };
-        let (border, mut order): (Vec<u32>, Vec<u32>) = (0..owned as u32).partition(on_border);
-        let inner = order.len();
-        order.extend(border);
+    /// The `order` of elimination, without any entry.
+    fn plan(here: u32, order: Order, numbering: &Numbering, pattern: &Pattern) -> Self {
         let entries = pattern.ghost_start / 2;
         Incomplete {
             here,
-            order,
-            inner,
+            order: order.nodes,
+            inner: order.inner,
             rows: vec![[0; 2]; numbering.len()],
             columns: Vec::with_capacity(entries),
             values: Vec::with_capacity(entries),
@@ -302,7 +298,7 @@ impl Incomplete {
 
 #[cfg(test)]
 mod tests {
-    use super::Incomplete;
+    use super::{Incomplete, Order};
     use crate::assembly::node_index::NodeIndex;
     use crate::assembly::{BlockMatrix, Numbering, Pattern};
     use crate::parallel::HaloPlan;
@@ -337,7 +333,8 @@ mod tests {
             index: NodeIndex::new(0..rows),
             halo: HaloPlan::default(),
         };
-        let mut factor = Incomplete::plan(0, &numbering, &pattern);
+        let order = Order { nodes: (0..rows as u32).collect(), inner: rows };
+        let mut factor = Incomplete::plan(0, order, &numbering, &pattern);
         assert_eq!((factor.inner, factor.order.len()), (rows, rows));
         let places = factor.places(&numbering);
         let mut spread = vec![0.0; rows];

@@ -10,6 +10,7 @@ use crate::grid::Grid;
 use crate::parallel::World;
 use crate::petsc::{Ksp, Matrix, options};
 
+use super::border::Border;
 use super::envelope::{self, Envelope};
 use super::incomplete::Incomplete;
 use super::iteration::Iteration;
@@ -41,6 +42,7 @@ enum Method<const D: usize> {
 struct Start {
     preconditioner: Incomplete,
     inverse_row_sum: Vec<f64>,
+    rows: Border,
 }
 
 /// A right-hand side with what is prescribed taken to it, and what is prescribed.
@@ -85,11 +87,14 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         } else {
             let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
             Method::Iterative(Box::new(Start {
-                preconditioner: Incomplete::factor(world, matrix, numbering, pattern, &diagonal),
+                preconditioner: Incomplete::factor(
+                    world, grid, matrix, numbering, pattern, &diagonal,
+                ),
                 inverse_row_sum: mass::row_sums(matrix, pattern, rows)
                     .iter()
                     .map(one_over)
                     .collect(),
+                rows: pattern.border(rows),
             }))
         };
         Ok(MassInverse { world, numbering, pattern, matrix, free, method, iterations: 0 })
@@ -99,17 +104,20 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     /// read where held. Returns local values, ghosts included. Collective. Error: a right-hand
     /// side that is not finite, or no convergence.
     pub fn solve(&mut self, rhs: &[f64], prescribed: &[f64]) -> Result<Vec<f64>> {
-        self.solve_from(rhs, prescribed, None)
+        let mut x = self.solve_from(rhs, prescribed, None)?;
+        self.numbering.halo.forward(self.world, &mut x, D)?;
+        Ok(x)
     }
 
     /// [`Self::solve`] with local values `guess` near the solution, where an iteration may start.
+    /// The ghosts are left without their values.
     pub fn solve_from(
         &mut self,
         rhs: &[f64],
         prescribed: &[f64],
         guess: Option<&[f64]>,
     ) -> Result<Vec<f64>> {
-        let prepared = self.prepare(rhs, prescribed)?;
+        let [prepared] = self.prepare([rhs], [prescribed])?;
         let solution = match &self.method {
             Method::Iterative(start) => {
                 let guess = guess.map(|guess| self.freed(guess));
@@ -128,20 +136,20 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             }
             Method::Petsc(_) => self.by_petsc(&prepared.b)?,
         };
-        self.complete(solution, prepared.x)
+        Ok(self.complete(solution, prepared.x))
     }
 
-    /// [`Self::solve`] for two right-hand sides, in one iteration where there is one.
+    /// [`Self::solve_from`] for two right-hand sides, in one iteration where there is one.
     pub fn solve_two(
         &mut self,
         rhs: [&[f64]; 2],
         prescribed: [&[f64]; 2],
     ) -> Result<[Vec<f64>; 2]> {
         let Method::Iterative(start) = &self.method else {
-            return Ok([self.solve(rhs[0], prescribed[0])?, self.solve(rhs[1], prescribed[1])?]);
+            let first = self.solve_from(rhs[0], prescribed[0], None)?;
+            return Ok([first, self.solve_from(rhs[1], prescribed[1], None)?]);
         };
-        let first = self.prepare(rhs[0], prescribed[0])?;
-        let second = self.prepare(rhs[1], prescribed[1])?;
+        let [first, second] = self.prepare(rhs, prescribed)?;
         let iteration = self.iteration(start);
         // Twice D is not a constant that the language can compute from D.
         let (solutions, iterations) = match D {
@@ -150,52 +158,63 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         };
         self.iterations += iterations;
         let [one, two] = solutions;
-        Ok([self.complete(one, first.x)?, self.complete(two, second.x)?])
+        Ok([self.complete(one, first.x), self.complete(two, second.x)])
     }
 
     /// Collective. Error: a right-hand side that is not finite.
-    fn prepare(&self, rhs: &[f64], prescribed: &[f64]) -> Result<Prepared> {
+    fn prepare<const N: usize>(
+        &self,
+        rhs: [&[f64]; N],
+        prescribed: [&[f64]; N],
+    ) -> Result<[Prepared; N]> {
         let owned = self.numbering.owned * D;
-        let mut x = vec![0.0; self.numbering.len() * D];
-        let mut moved = false;
-        for dof in 0..owned {
-            if !self.free[dof] && prescribed[dof] != 0.0 {
-                x[dof] = prescribed[dof];
-                moved = true;
+        let mark = |mark: bool| f64::from(u8::from(mark));
+        let mut x = [(); N].map(|()| vec![0.0; self.numbering.len() * D]);
+        // What moves, then whether there are bad values.
+        let mut marks = vec![0.0; N + 1];
+        for (k, x) in x.iter_mut().enumerate() {
+            for dof in (0..owned).filter(|&dof| !self.free[dof]) {
+                x[dof] = prescribed[k][dof];
+                marks[k] += mark(x[dof] != 0.0);
             }
         }
-        let mut b = rhs.to_vec();
-        let bad = rhs.iter().any(|b| !b.is_finite());
-        let marks = [f64::from(u8::from(moved)), f64::from(u8::from(bad))];
+        marks[N] = mark(rhs.iter().any(|b| b.iter().any(|b| !b.is_finite())));
         let marks = self.world.sum_slice(&marks);
-        if marks[1] > 0.0 {
+        if marks[N] > 0.0 {
             return Err(Error::Run("momentum or force at the nodes is not finite".into()));
         }
-        if marks[0] > 0.0 {
-            self.numbering.halo.forward(self.world, &mut x, D)?;
-            let mut share = vec![0.0; owned];
-            mass::multiply::<D>(self.matrix, self.pattern, &x, &mut share);
-            for (b, s) in b.iter_mut().zip(share) {
-                *b -= s;
-            }
+        if marks.iter().any(|&mark| mark > 0.0) {
+            let fields = x.each_mut().map(|x| &mut x[..]);
+            self.numbering.halo.forward_while(self.world, fields, D, |_| ());
         }
-        for (b, free) in b.iter_mut().zip(&self.free) {
-            if !free {
-                *b = 0.0;
+        let mut number = 0;
+        Ok(x.map(|x| {
+            let mut b = rhs[number].to_vec();
+            if marks[number] > 0.0 {
+                let mut share = vec![0.0; owned];
+                mass::multiply::<D>(self.matrix, self.pattern, &x, &mut share);
+                for (b, s) in b.iter_mut().zip(share) {
+                    *b -= s;
+                }
             }
-        }
-        Ok(Prepared { b, x })
+            for (b, free) in b.iter_mut().zip(&self.free) {
+                if !free {
+                    *b = 0.0;
+                }
+            }
+            number += 1;
+            Prepared { b, x }
+        }))
     }
 
-    /// The free values of `solution` put into `x`, and both brought to the ghosts. Collective.
-    fn complete(&self, solution: Vec<f64>, mut x: Vec<f64>) -> Result<Vec<f64>> {
+    /// The free values of `solution` put into `x`.
+    fn complete(&self, solution: Vec<f64>, mut x: Vec<f64>) -> Vec<f64> {
         for (dof, value) in solution.into_iter().enumerate() {
             if self.free[dof] {
                 x[dof] = value;
             }
         }
-        self.numbering.halo.forward(self.world, &mut x, D)?;
-        Ok(x)
+        x
     }
 
     fn freed(&self, values: &[f64]) -> Vec<f64> {
@@ -210,6 +229,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             matrix: self.matrix,
             preconditioner: &start.preconditioner,
             inverse_row_sum: &start.inverse_row_sum,
+            rows: &start.rows,
         }
     }
 

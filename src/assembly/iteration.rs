@@ -1,9 +1,12 @@
 //! Conjugate gradients on M X = B for several right-hand sides in lockstep: one sweep over the
 //! scalar matrix and one reduction serve them all; each has its own steps and its own end.
 
+use std::ops::Range;
+
 use crate::error::{Error, Result};
 use crate::parallel::World;
 
+use super::border::Border;
 use super::incomplete::Incomplete;
 use super::{BlockMatrix, Numbering, Pattern, mass};
 
@@ -27,6 +30,8 @@ pub struct Iteration<'a> {
     /// One over the lumped mass, per owned node: where the iteration starts without a guess. For
     /// a constant field that is the solution. Zero where there is no mass.
     pub inverse_row_sum: &'a [f64],
+    /// The owned rows by whether they have columns of other ranks.
+    pub rows: &'a Border,
 }
 
 impl Iteration<'_> {
@@ -59,14 +64,16 @@ impl Iteration<'_> {
         }
         let mut x = p[..owned].to_vec();
         let mut product = vec![[0.0; C]; owned];
-        self.numbering.halo.forward(world, p.as_flattened_mut(), C)?;
-        self.multiply(&p, free, &mut product);
+        self.multiply(&mut p, free, &mut product);
         let mut r: Vec<[f64; C]> =
             b.iter().zip(&product).map(|(b, p)| std::array::from_fn(|k| b[k] - p[k])).collect();
         p.fill([0.0; C]);
         let mut z = vec![[0.0; C]; self.numbering.len()];
-        let whole = precondition(b, &mut z)?;
-        let mut size = precondition(&r, &mut z)?;
+        let mut apply =
+            |r: &[[f64; C]]| self.preconditioner.apply(world, self.numbering, r, free, &mut z);
+        let sizes = world.sum_slice([apply(b)?, apply(&r)?].as_flattened());
+        let whole: [f64; C] = std::array::from_fn(|k| sizes[k]);
+        let mut size: [f64; C] = std::array::from_fn(|k| sizes[C + k]);
         // Accelerations of nearly empty nodes are no place to start from.
         let restart: [bool; C] = std::array::from_fn(|k| !(size[k] < whole[k]));
         if restart.contains(&true) {
@@ -104,8 +111,7 @@ impl Iteration<'_> {
                     p[k] = z[k] + factor[k] * p[k];
                 }
             }
-            self.numbering.halo.forward(world, p.as_flattened_mut(), C)?;
-            let curvature = all(self.multiply(&p, free, &mut product));
+            let curvature = all(self.multiply(&mut p, free, &mut product));
             if (0..C).any(|k| active[k] && curvature[k] <= 0.0) {
                 return Err(Error::Run(
                     "the consistent mass matrix is not positive definite; stabilise it ([ghost] \
@@ -134,15 +140,22 @@ impl Iteration<'_> {
     }
 
     /// M x at free values, zero in the others, where x (local) is zero too; returns x·M x of each
-    /// over this rank's rows.
+    /// over this rank's rows. The ghosts of x come while inner rows are multiplied.
     fn multiply<const C: usize>(
         &self,
-        x: &[[f64; C]],
+        x: &mut [[f64; C]],
         free: &[[bool; C]],
         product: &mut [[f64; C]],
     ) -> [f64; C] {
-        let (flat, out) = (x.as_flattened(), product.as_flattened_mut());
-        mass::multiply::<C>(self.matrix, self.pattern, flat, out);
+        let mut rows = |runs: &[Range<usize>], x: &[f64]| {
+            for run in runs {
+                let out = product.as_flattened_mut();
+                mass::multiply_rows::<C>(self.matrix, self.pattern, run.clone(), x, out);
+            }
+        };
+        let flat = x.as_flattened_mut();
+        self.numbering.halo.forward_while(self.world, [flat], C, |[x]| rows(&self.rows.inner, x));
+        rows(&self.rows.reaching, x.as_flattened());
         let mut products = [0.0; C];
         for ((out, free), x) in product.iter_mut().zip(free).zip(x) {
             for k in 0..C {

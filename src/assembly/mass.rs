@@ -3,6 +3,8 @@
 //! All are scalar, the same for each component: M ⊗ 1. The entries of M_G sum to zero, so the
 //! stabilised matrix has the mass and the momentum of the plain one.
 
+use std::ops::Range;
+
 use crate::error::Result;
 use crate::parallel::World;
 
@@ -13,13 +15,18 @@ use super::{BlockMatrix, Pattern};
 /// Row sums at the local nodes; ghost shares are not yet sent to their owners. kg
 pub fn lumped<const D: usize>(step: StepPoints<'_, D>, nodes: usize) -> Vec<f64> {
     let mut mass = vec![0.0; nodes];
-    for p in 0..step.points.len() {
+    add_lumped(step, 0..step.points.len(), &mut mass);
+    mass
+}
+
+/// Adds [`lumped`] of some of the points.
+pub fn add_lumped<const D: usize>(step: StepPoints<'_, D>, part: Range<usize>, mass: &mut [f64]) {
+    for p in part {
         let weights = &step.influences.weights[step.influences.row(p)];
         for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
             mass[node as usize] += weight * step.points.mass[p];
         }
     }
-    mass
 }
 
 /// The consistent matrix in its owners' rows, one dense block per group of points. Collective.
@@ -74,9 +81,21 @@ pub fn multiply<const D: usize>(
     x: &[f64],
     y: &mut [f64],
 ) {
+    multiply_rows::<D>(matrix, pattern, 0..y.len() / D, x, y);
+}
+
+/// [`multiply`] for some of the rows; `y` holds all owned ones.
+pub fn multiply_rows<const D: usize>(
+    matrix: &BlockMatrix<1>,
+    pattern: &Pattern,
+    rows: Range<usize>,
+    x: &[f64],
+    y: &mut [f64],
+) {
     let (x, _) = x.as_chunks::<D>();
     let (y, _) = y.as_chunks_mut::<D>();
-    for (out, range) in y.iter_mut().zip(pattern.offsets.windows(2)) {
+    let ranges = pattern.offsets[rows.start..=rows.end].windows(2);
+    for (out, range) in y[rows].iter_mut().zip(ranges) {
         let range = range[0]..range[1];
         let mut sum = [0.0; D];
         for (&column, value) in pattern.columns[range.clone()].iter().zip(&matrix.values[range]) {

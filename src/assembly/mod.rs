@@ -22,7 +22,9 @@
 //! | `manufactured.rs` | body forces that make a given field exact (Lagrangian §7.4) |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 
+pub mod border;
 pub mod conditions;
+mod elimination;
 pub mod envelope;
 pub mod external;
 pub mod graph;

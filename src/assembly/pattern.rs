@@ -4,6 +4,7 @@
 use crate::error::Result;
 use crate::parallel::{World, exchange};
 
+use super::border::Border;
 use super::graph::{Lists, neighbours};
 use super::node_index::NodeIndex;
 use super::numbering::{Numbering, Touched};
@@ -166,6 +167,14 @@ fn drop_repeats(items: &mut Vec<u32>, start: usize) {
 }
 
 impl Pattern {
+    /// The first `owned` rows, those with columns of other ranks' nodes apart.
+    pub fn border(&self, owned: usize) -> Border {
+        let reaches = |row: &[usize]| {
+            self.columns[row[0]..row[1]].iter().any(|&column| column as usize >= owned)
+        };
+        Border::new(self.offsets.windows(2).take(owned).map(reaches))
+    }
+
     /// Position of column `local` in the row `row`, if the pair is in the pattern.
     pub fn find(&self, numbering: &Numbering, row: usize, local: usize) -> Option<usize> {
         let range = self.offsets[row]..self.offsets[row + 1];

@@ -1,4 +1,7 @@
 //! Fixed exchange of nodal values between owners and the ranks that hold copies (ghosts).
+//!
+//! The `..._while` forms do other work between sending and receiving. Messages have buffers of
+//! their own and end before these functions return, whatever comes of the work.
 
 use mpi::traits::*;
 
@@ -88,7 +91,7 @@ impl HaloPlan {
             }
             rest = tail;
         }
-        swap(world, &packed, slots);
+        swap(world, &packed, slots, || ());
         Ok(())
     }
 
@@ -121,16 +124,74 @@ impl HaloPlan {
             .map(|(rank, locals)| (*rank, &locals[..], vec![0.0; locals.len() * block]))
             .collect();
         let slots = received.iter_mut().map(|(rank, _, buffer)| (*rank, &mut buffer[..])).collect();
-        swap(world, &packed, slots);
+        swap(world, &packed, slots, || ());
         for (_, locals, buffer) in &received {
-            for (&local, block_values) in locals.iter().zip(buffer.chunks_exact(block)) {
-                let start = local as usize * block;
-                for (value, add) in values[start..start + block].iter_mut().zip(block_values) {
-                    *value += add;
-                }
-            }
+            add(values, locals, buffer, block);
         }
         Ok(())
+    }
+
+    /// [`Self::forward`] of several arrays in one message, while `work` reads their owned values.
+    /// Collective over neighbours.
+    pub fn forward_while<R, const N: usize>(
+        &self,
+        world: &World,
+        mut fields: [&mut [f64]; N],
+        block: usize,
+        work: impl FnOnce([&[f64]; N]) -> R,
+    ) -> R {
+        let packed: Vec<(usize, Vec<f64>)> = self
+            .copies
+            .iter()
+            .map(|(rank, locals)| {
+                (*rank, fields.iter().flat_map(|field| gather(field, locals, block)).collect())
+            })
+            .collect();
+        let mut received: Vec<Vec<f64>> =
+            self.ghosts.iter().map(|(_, range)| vec![0.0; range.len() * block * N]).collect();
+        let slots =
+            self.ghosts.iter().zip(&mut received).map(|((rank, _), slot)| (*rank, &mut slot[..]));
+        let done = swap(world, &packed, slots.collect(), || work(fields.each_ref().map(|f| &**f)));
+        for ((_, range), buffer) in self.ghosts.iter().zip(&received) {
+            for (field, part) in fields.iter_mut().zip(buffer.chunks_exact(range.len() * block)) {
+                field[range.start * block..range.end * block].copy_from_slice(part);
+            }
+        }
+        done
+    }
+
+    /// [`Self::reverse_add`] of several arrays in one message, while `work` changes their values
+    /// at owned nodes; those at ghosts are on their way already. Collective over neighbours.
+    pub fn reverse_add_while<R, const N: usize>(
+        &self,
+        world: &World,
+        mut fields: [&mut [f64]; N],
+        block: usize,
+        work: impl FnOnce([&mut [f64]; N]) -> R,
+    ) -> R {
+        let packed: Vec<(usize, Vec<f64>)> = self
+            .ghosts
+            .iter()
+            .map(|(rank, range)| {
+                let range = range.start * block..range.end * block;
+                (
+                    *rank,
+                    fields.iter().flat_map(|field| field[range.clone()].iter().copied()).collect(),
+                )
+            })
+            .collect();
+        let mut received: Vec<Vec<f64>> =
+            self.copies.iter().map(|(_, locals)| vec![0.0; locals.len() * block * N]).collect();
+        let slots =
+            self.copies.iter().zip(&mut received).map(|((rank, _), slot)| (*rank, &mut slot[..]));
+        let done =
+            swap(world, &packed, slots.collect(), || work(fields.each_mut().map(|f| &mut **f)));
+        for ((_, locals), buffer) in self.copies.iter().zip(&received) {
+            for (field, part) in fields.iter_mut().zip(buffer.chunks_exact(locals.len() * block)) {
+                add(field, locals, part, block);
+            }
+        }
+        done
     }
 
     /// Ranks that hold copies, with the local indices of the owned values they copy; ascending.
@@ -158,17 +219,32 @@ fn gather(values: &[f64], locals: &[u32], block: usize) -> Vec<f64> {
     packed
 }
 
-/// Known messages both ways: every send has its receive.
-fn swap(world: &World, sends: &[(usize, Vec<f64>)], receives: Vec<(usize, &mut [f64])>) {
+/// Adds blocks to the local values they belong to.
+fn add(values: &mut [f64], locals: &[u32], blocks: &[f64], block: usize) {
+    for (&local, block_values) in locals.iter().zip(blocks.chunks_exact(block)) {
+        let start = local as usize * block;
+        for (value, add) in values[start..start + block].iter_mut().zip(block_values) {
+            *value += add;
+        }
+    }
+}
+
+/// Known messages both ways, every send with its receive, and `work` while they travel.
+fn swap<R>(
+    world: &World,
+    sends: &[(usize, Vec<f64>)],
+    receives: Vec<(usize, &mut [f64])>,
+    work: impl FnOnce() -> R,
+) -> R {
     const TAG: i32 = 17;
     let comm = world.comm();
     let count = sends.len() + receives.len();
     if count == 0 {
-        return;
+        return work();
     }
     sends.iter().for_each(|(_, values)| traffic::count_message(size_of_val(&values[..])));
-    let exchange = || {
-        mpi::request::multiple_scope(count, |scope, requests| {
+    mpi::request::multiple_scope(count, |scope, requests| {
+        traffic::waiting(|| {
             for (rank, buffer) in receives {
                 let process = comm.process_at_rank(rank as i32);
                 requests.add(process.immediate_receive_into_with_tag(scope, buffer, TAG));
@@ -177,9 +253,9 @@ fn swap(world: &World, sends: &[(usize, Vec<f64>)], receives: Vec<(usize, &mut [
                 let process = comm.process_at_rank(*rank as i32);
                 requests.add(process.immediate_send_with_tag(scope, &values[..], TAG));
             }
-            let mut done = Vec::with_capacity(count);
-            requests.wait_all(&mut done);
-        })
-    };
-    traffic::waiting(exchange);
+        });
+        let done = work();
+        traffic::waiting(|| requests.wait_all(&mut Vec::with_capacity(count)));
+        done
+    })
 }

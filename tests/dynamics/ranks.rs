@@ -1,5 +1,6 @@
 //! The number of ranks is not seen in the answer.
 
+use super::blocks::blocks;
 use super::ghosts::contact;
 use crate::common::run::{Results, Run, relative_difference};
 
@@ -37,6 +38,40 @@ fn explicit_lumped_plastic() {
         .set("material.soft.model=\"von-mises\"")
         .set("material.soft.yield=5");
     on_all_ranks(&run, 60);
+}
+
+/// Slices of the grid one cell wide: some ranks hold points of which every one touches nodes of
+/// another rank, some none of that kind, some no points at all.
+#[test]
+fn explicit_with_ranks_all_border_and_without_points() {
+    let body = "name = \"block\"\nshape = { box = { min = [1.1, 1.1], max = [3.2, 4.3] } }\n\
+                points_per_cell = [2, 2]\nvelocity = ['0.3*Y', '0.2*sin(X)']";
+    for (basis, mass, update) in [
+        ("mpm", "lumped", "usl"),
+        ("gimp", "lumped", "usf"),
+        ("mpm", "consistent", "musl"),
+        ("cpdi2", "consistent", "usl"),
+    ] {
+        let run = blocks(&[body])
+            .set(format!("method.basis=\"{basis}\""))
+            .set(format!("method.mass=\"{mass}\""))
+            .set(format!("method.stress_update=\"{update}\""))
+            .set("ghost.mass_factor=0.25")
+            .set("grid.size=[4, 8]")
+            .set("parallel.initial=\"slabs\"")
+            .set("parallel.brick=1")
+            .set("analysis.steps=30")
+            .set("analysis.duration=0.015");
+        let one = run.results();
+        for ranks in [2, 3, 4] {
+            let other = run.clone().ranks(ranks).results();
+            for field in ["displacement", "velocity"] {
+                let (a, b) = (one.points(30), other.points(30));
+                let difference = relative_difference(b.field(field), a.field(field));
+                assert!(difference < 1e-12, "{basis} {mass} {ranks}: {field} {difference:e}");
+            }
+        }
+    }
 }
 
 #[test]
