@@ -13,7 +13,7 @@ use super::{BlockMatrix, Numbering, Pattern, mass};
 /// Relative residual of the iteration, in the norm of the preconditioner. That underrates the
 /// error where the factor is poor, at nearly empty nodes most; and what is left of each step adds
 /// up: with `pic`, in J, with the square of the steps.
-const TOLERANCE: f64 = 1e-15;
+const TOLERANCE: f64 = 5e-16;
 /// Where round-off stops the iteration above [`TOLERANCE`], this much is accepted.
 const ACCEPTABLE: f64 = 1e-10;
 /// Iterations; the worst well-posed systems take a few hundred.
