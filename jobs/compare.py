@@ -41,7 +41,8 @@ def cases(quick):
             "--set", f"analysis.steps={steps}", "--set", "analysis.tolerance=1e-8",
             "--set", f"load.0.point.force=[0, -{force}]", "--set", "output.every=1000",
             # Less memory than the direct solver, the default at this size, and a little faster.
-            "--set", 'petsc.qs_ksp_type="cg"', "--set", 'petsc.qs_pc_type="mg"']
+            "--set", 'petsc.qs_ksp_type="cg"', "--set", 'petsc.qs_pc_type="mg"',
+            "--set", "petsc.qs_ksp_rtol=1e-8"]
     block = {"cells": cells, "points": 2, "gravity": 10.0, "young": 1e6, "poisson": 0.3,
              "density": 1000.0, "steps": 4, "law": "hencky", "kratos_tolerance": 1e-8,
              "linear": AMGCL}
