@@ -7,7 +7,7 @@
 //! | what carries the points | `transport.rs` | Ghost eq. 9 |
 //! | `implicit-dynamic` | `implicit_dynamic.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
-//! | points to nodes and back | `mapping.rs` | Ghost eq. 6, 8-10 |
+//! | points to nodes and back | `mapping.rs`, across ranks `nodal_sums.rs` | Ghost eq. 6, 8-10 |
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |

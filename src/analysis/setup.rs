@@ -11,7 +11,8 @@ use crate::material::Material;
 use crate::output::checkpoint::Restored;
 use crate::parallel::{self, Partition, World};
 use crate::points::Points;
-use crate::points::seed::{self, CellByCell, Share};
+use crate::points::seed::{self, CellByCell};
+use crate::points::share::Share;
 
 use super::balance::Balance;
 use super::discretise::Model;

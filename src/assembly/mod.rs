@@ -14,7 +14,8 @@
 //! | `mass.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
 //! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
 //! | `iteration.rs` | conjugate gradients on several right-hand sides |
-//! | `incomplete.rs` | their preconditioner: Cholesky without fill |
+//! | `incomplete.rs`, `elimination.rs` | their preconditioner: Cholesky without fill, and its order |
+//! | `border.rs` | what waits for other ranks, and what does not |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
 //! | `in_place.rs` | those rows in the solver's own memory |
 //! | `held.rs` | held degrees of freedom in those rows |

@@ -7,7 +7,8 @@ use super::{Partition, World, exchange};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::Points;
-use crate::points::seed::{CellByCell, Share};
+use crate::points::seed::CellByCell;
+use crate::points::share::Share;
 use crate::points::sort::sort_by_cell;
 
 /// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns

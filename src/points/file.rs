@@ -6,7 +6,7 @@ use crate::deck::model::Body;
 use crate::error::{Error, Result};
 
 use super::Points;
-use super::seed::Share;
+use super::share::Share;
 
 /// Reads this rank's share of the lines; the domain of each point is a square (cube) of its
 /// volume. Returns the number of lines.

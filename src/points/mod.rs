@@ -5,11 +5,15 @@
 //! | `mod.rs` | the fields, and how a point is packed, moved and reordered |
 //! | `gather.rs` | a field's values in another order |
 //! | `seed.rs` | deck bodies -> points |
+//! | `seed_cells.rs` | the same for bodies that fill the cells of a mesh |
+//! | `share.rs` | which of them a rank makes |
 //! | `sort.rs` | points in the order of their cells |
 
 pub mod file;
 mod gather;
 pub mod seed;
+mod seed_cells;
+pub mod share;
 pub mod sort;
 
 use gather::Gather;

@@ -8,7 +8,8 @@ use mpm_par::grid::Grid;
 use mpm_par::parallel::migrate::{locate, migrate_from};
 use mpm_par::parallel::{Partition, World};
 use mpm_par::points::Points;
-use mpm_par::points::seed::{CellByCell, Share, seed};
+use mpm_par::points::seed::{CellByCell, seed};
+use mpm_par::points::share::Share;
 use mpm_par::{deck, parallel};
 
 use crate::common::on_ranks;
