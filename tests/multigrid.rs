@@ -473,16 +473,6 @@ fn solve<const D: usize>(
     prefix: &str,
     options: &[(&str, &str)],
     levels: bool,
-) -> Solved {
-    attempt(world, block, prefix, options, levels).unwrap()
-}
-
-fn attempt<const D: usize>(
-    world: &World,
-    block: Block<D>,
-    prefix: &str,
-    options: &[(&str, &str)],
-    levels: bool,
 ) -> Result<Solved> {
     let share = block.share(world);
     let mut problem = Hardening { world, share, levels, made: [0; 2], residual: f64::NAN };
@@ -520,12 +510,12 @@ fn smoothers_that_need_entries_are_refused() {
         let block = Block { cells: [12, 9], held: true };
         for kind in ["sor", "eisenstat"] {
             let options = [("mg_levels_pc_type", kind)];
-            let refused = attempt(&world, block, &format!("{kind}_"), &options, true);
+            let refused = solve(&world, block, &format!("{kind}_"), &options, true);
             let text = refused.err().expect("an error").to_string();
             assert!(text.contains("pc_type gamg"), "{text}");
         }
         // The next solver is not harmed.
-        solve(&world, block, "next_", &[], true);
+        solve(&world, block, "next_", &[], true).unwrap();
     });
 }
 
@@ -541,12 +531,12 @@ fn newton_takes_the_same_iterations_on_any_number_of_ranks() {
 }
 
 fn same_iterations<const D: usize>(world: &World, block: Block<D>) {
-    let exact = solve(world, block, "lu_", &[("mg_coarse_ksp_rtol", "1e-12")], false);
+    let exact = solve(world, block, "lu_", &[("mg_coarse_ksp_rtol", "1e-12")], false).unwrap();
     assert_eq!(exact.made, [0; 2], "one level, solved directly");
-    let kept = solve(world, block, "kept_", &[], true);
-    let one = solve(&alone(), block, "one_", &[], true);
-    let again = solve(world, block, "again_", &[], true);
-    let new = solve(world, block, "new_", &[("snes_lag_preconditioner", "1")], true);
+    let kept = solve(world, block, "kept_", &[], true).unwrap();
+    let one = solve(&alone(), block, "one_", &[], true).unwrap();
+    let again = solve(world, block, "again_", &[], true).unwrap();
+    let new = solve(world, block, "new_", &[("snes_lag_preconditioner", "1")], true).unwrap();
     assert_eq!(kept.newton, one.newton);
     // A norm may fall to either side of the tolerance by round-off.
     assert!(kept.linear.abs_diff(one.linear) <= 2, "{} {}", kept.linear, one.linear);

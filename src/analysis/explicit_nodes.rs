@@ -239,11 +239,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
     /// M~^-1 of sums at the owned nodes, with the boundaries' velocity, at all local nodes; from a
     /// `guess` near it if there is one. Collective.
     fn solve(&mut self, sums: &[[f64; D]], guess: Option<&[f64]>) -> Result<Vec<f64>> {
-        timed(&mut self.seconds, || {
-            let mut x = self.inverse.solve_summed(sums, &self.held_velocity, guess)?;
-            self.mesh.numbering.halo.forward(self.world, &mut x, D)?;
-            Ok(x)
-        })
+        timed(&mut self.seconds, || self.inverse.solve_to_ghosts(sums, &self.held_velocity, guess))
     }
 
     /// What is pushed must have mass. Collective.
@@ -266,10 +262,9 @@ impl<'a, const D: usize> Nodes<'a, D> {
         for _ in 1..order {
             let back = mapping::at_points(step, &term);
             let momentum = self.momentum(step, &back);
-            let mut mapped = timed(&mut self.seconds, || {
-                self.inverse.solve_summed(&momentum, &self.at_rest, None)
+            let mapped = timed(&mut self.seconds, || {
+                self.inverse.solve_to_ghosts(&momentum, &self.at_rest, None)
             })?;
-            self.mesh.numbering.halo.forward(self.world, &mut mapped, D)?;
             for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
                 *t -= m;
                 *s += *t;

@@ -135,17 +135,21 @@ enum How<'a, const D: usize> {
 impl<const D: usize> Inverse<'_, D> {
     /// M x = `sums`, where held x = `prescribed` (local). `sums` are nodal sums of this rank's
     /// points, sent to their owners here. Returns local values. Collective.
-    pub fn solve(&mut self, sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
-        let sums = self.summed(sums)?;
-        let mut x = self.solve_summed(&sums, prescribed, None)?;
-        self.mesh.numbering.halo.forward(self.world, &mut x, D)?;
-        Ok(x)
+    pub fn solve(&mut self, mut sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
+        self.mesh.numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
+        self.solve_to_ghosts(&sums, prescribed, None)
     }
 
-    /// Nodal sums of this rank's points with those of the others, at the owned nodes. Collective.
-    fn summed(&self, mut sums: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
-        self.mesh.numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
-        Ok(sums)
+    /// [`Self::solve_summed`] with the values at the ghosts. Collective.
+    pub fn solve_to_ghosts(
+        &mut self,
+        sums: &[[f64; D]],
+        prescribed: &[f64],
+        guess: Option<&[f64]>,
+    ) -> Result<Vec<f64>> {
+        let mut x = self.solve_summed(sums, prescribed, guess)?;
+        self.mesh.numbering.halo.forward(self.world, &mut x, D)?;
+        Ok(x)
     }
 
     /// [`Self::solve_summed`] for two right-hand sides at once. Collective.

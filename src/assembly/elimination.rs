@@ -6,8 +6,11 @@
 //! holds on both sides of it only where each side runs towards it: away from it, what is
 //! eliminated first couples the border with the far end.
 
+use std::ops::Range;
+
 use crate::grid::{Grid, Lattice};
 
+use super::border::Border;
 use super::{Numbering, Pattern};
 
 /// An axis is turned if the border lies below by this share of what it does along the main axis.
@@ -21,24 +24,29 @@ pub struct Order {
 }
 
 impl Order {
-    /// Meshes have no axes: ascending there, and in space.
-    pub fn new<const D: usize>(grid: &Grid<D>, numbering: &Numbering, pattern: &Pattern) -> Self {
-        let owned = numbering.owned;
-        let foreign = |row: u32| {
-            let row = pattern.offsets[row as usize]..pattern.offsets[row as usize + 1];
-            pattern.columns[row].iter().copied().filter(|&column| column as usize >= owned)
+    /// `rows`: the border of the pattern. Meshes have no axes: ascending there, and in space.
+    pub fn new<const D: usize>(
+        grid: &Grid<D>,
+        numbering: &Numbering,
+        pattern: &Pattern,
+        rows: &Border,
+    ) -> Self {
+        let listed = |runs: &[Range<usize>]| -> Vec<u32> {
+            runs.iter().cloned().flatten().map(|row| row as u32).collect()
         };
-        let (border, mut nodes): (Vec<u32>, Vec<u32>) =
-            (0..owned as u32).partition(|&node| foreign(node).next().is_some());
+        let (border, mut nodes) = (listed(&rows.reaching), listed(&rows.inner));
         let inner = nodes.len();
         // In space the borders are too frayed for it to gain, and pic in the stretch loses digits.
         if D == 2
             && let Grid::Lattice(lattice) = grid
         {
             let of = |node: u32| numbering.nodes[node as usize];
-            let pairs = border
-                .iter()
-                .flat_map(|&row| foreign(row).map(move |column| (of(row), of(column))));
+            let pairs = border.iter().flat_map(|&row| {
+                let columns = pattern.offsets[row as usize]..pattern.offsets[row as usize + 1];
+                let columns = pattern.columns[columns].iter().copied();
+                let foreign = columns.filter(|&column| column as usize >= numbering.owned);
+                foreign.map(move |column| (of(row), of(column)))
+            });
             run_along(lattice, downward(lattice, pairs), &numbering.nodes, &mut nodes);
         }
         nodes.extend(border);

@@ -12,7 +12,6 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use crate::error::Result;
-use crate::grid::Grid;
 use crate::parallel::World;
 use crate::parallel::exchange::{receive_list, send_lists};
 
@@ -61,15 +60,14 @@ fn turn(rank: usize) -> u32 {
 impl Incomplete {
     /// `diagonal`: of the owned rows of `matrix`, not negative; rows where it is zero are left
     /// out. Collective.
-    pub fn factor<const D: usize>(
+    pub fn factor(
         world: &World,
-        grid: &Grid<D>,
+        order: Order,
         matrix: &BlockMatrix<1>,
         numbering: &Numbering,
         pattern: &Pattern,
         diagonal: &[f64],
     ) -> Self {
-        let order = Order::new(grid, numbering, pattern);
         let mut factor = Incomplete::plan(turn(world.rank()), order, numbering, pattern);
         let places = factor.places(numbering);
         let mut spread = vec![0.0; numbering.len()];

@@ -11,6 +11,7 @@ use crate::parallel::World;
 use crate::petsc::{Ksp, Matrix, options};
 
 use super::border::Border;
+use super::elimination::Order;
 use super::envelope::{self, Envelope};
 use super::incomplete::Incomplete;
 use super::iteration::Iteration;
@@ -86,15 +87,17 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             Method::Direct(factors, which)
         } else {
             let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
+            let border = pattern.border(rows);
+            let order = Order::new(grid, numbering, pattern, &border);
             Method::Iterative(Box::new(Start {
                 preconditioner: Incomplete::factor(
-                    world, grid, matrix, numbering, pattern, &diagonal,
+                    world, order, matrix, numbering, pattern, &diagonal,
                 ),
                 inverse_row_sum: mass::row_sums(matrix, pattern, rows)
                     .iter()
                     .map(one_over)
                     .collect(),
-                rows: pattern.border(rows),
+                rows: border,
             }))
         };
         Ok(MassInverse { world, numbering, pattern, matrix, free, method, iterations: 0 })
@@ -187,10 +190,9 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             let fields = x.each_mut().map(|x| &mut x[..]);
             self.numbering.halo.forward_while(self.world, fields, D, |_| ());
         }
-        let mut number = 0;
-        Ok(x.map(|x| {
-            let mut b = rhs[number].to_vec();
-            if marks[number] > 0.0 {
+        Ok(std::array::from_fn(|k| {
+            let (mut b, x) = (rhs[k].to_vec(), std::mem::take(&mut x[k]));
+            if marks[k] > 0.0 {
                 let mut share = vec![0.0; owned];
                 mass::multiply::<D>(self.matrix, self.pattern, &x, &mut share);
                 for (b, s) in b.iter_mut().zip(share) {
@@ -202,7 +204,6 @@ impl<'a, const D: usize> MassInverse<'a, D> {
                     *b = 0.0;
                 }
             }
-            number += 1;
             Prepared { b, x }
         }))
     }

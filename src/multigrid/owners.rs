@@ -1,5 +1,5 @@
-//! Who owns the nodes of a coarse level: the ranks of their roots while these have plenty, then the
-//! first of every 2, 4, 8, ... ranks. A level of a few nodes on each of many ranks is all messages.
+//! Who owns the nodes of a coarse level: the ranks of their roots while these have plenty, then one of
+//! every 2, 4, 8, ... ranks. A level of a few nodes on each of many ranks is all messages.
 
 use std::ops::Range;
 
@@ -15,6 +15,8 @@ const ENOUGH: usize = 100;
 /// First coarse node of each rank. Those without nodes begin where the next one does.
 pub struct Owners {
     first: Vec<usize>,
+    /// So many ranks have given their nodes to one of them.
+    together: usize,
     rank: usize,
     total: usize,
 }
@@ -29,11 +31,12 @@ impl Owners {
         for begin in (0..first.len()).step_by(together) {
             let end = first.len().min(begin + together);
             let (from, to) = (first[begin], first.get(end).copied().unwrap_or(total));
+            // The middle one: another for each size of groups, so that nobody serves on two levels.
             let owner = (begin + together / 2).min(end - 1);
             first[begin..=owner].fill(from);
             first[owner + 1..end].fill(to);
         }
-        Owners { first, rank: world.rank(), total }
+        Owners { first, together, rank: world.rank(), total }
     }
 
     /// Of this rank.
@@ -53,21 +56,20 @@ impl Owners {
             values.push(fine.key[root as usize]);
             values.extend(fine.position[root as usize]);
         }
-        let own = aggregates.first..aggregates.first + aggregates.roots.len();
-        if !world.any(own != self.owned()) {
+        if self.together == 1 {
             return Ok(values);
         }
-        // They are consecutive, and those of all members of a group go to its first rank.
+        // They are consecutive, and those of all members of a group go to the same rank.
         let outgoing = match aggregates.roots.len() {
             0 => Vec::new(),
-            _ => vec![(self.of_number(own.start as i32), values)],
+            _ => vec![(self.of_number(aggregates.first as i32), values)],
         };
         // In ascending order of the ranks, as the nodes are.
         Ok(exchange(world, outgoing)?.into_iter().flat_map(|(_, values)| values).collect())
     }
 }
 
-/// How many ranks give their nodes to the first of them.
+/// How many ranks give their nodes to one of them.
 fn together(ranks: usize, nodes: usize) -> usize {
     let mut together = 1;
     while together < ranks && nodes < ENOUGH * ranks.div_ceil(together) {

@@ -30,7 +30,7 @@ pub fn migrate_from<const D: usize>(
     partition: &Partition<D>,
     grid: &Grid<D>,
     points: &mut Points<D>,
-    cells: Vec<usize>,
+    mut cells: Vec<usize>,
 ) -> Result<usize> {
     let leaving = leaving(world, partition, grid, &cells);
     let moved = world.sum_usize(leaving.len());
@@ -45,7 +45,6 @@ pub fn migrate_from<const D: usize>(
     for (_, list) in arrived {
         list.chunks_exact(words).for_each(|record| points.unpack(record));
     }
-    let mut cells = cells;
     // The sender located the same position with the same arithmetic.
     append_cells(grid, points, &mut cells)?;
     sort_by_cell(points, &cells, Some(staying(own, points.len(), &leaving)));
@@ -62,12 +61,13 @@ pub fn settle<const D: usize>(
     mut cells: Vec<usize>,
     seeding: &CellByCell<'_, D>,
 ) -> Result<usize> {
-    let leaving = leaving(world, partition, grid, &cells);
-    let (sent, remade): (Vec<_>, Vec<_>) =
-        leaving.iter().copied().partition(|&(p, _)| !seeding.makes(points.body[p] as usize));
-    if world.sum_usize(remade.len()) == 0 {
+    if world.size() == 1 || !(0..seeding.bodies()).any(|body| seeding.makes(body)) {
         return migrate_from(world, partition, grid, points, cells);
     }
+    let leaving = leaving(world, partition, grid, &cells);
+    let moved = world.sum_usize(leaving.len());
+    let mut sent = leaving.clone();
+    sent.retain(|&(p, _)| !seeding.makes(points.body[p] as usize));
     let here = world.rank();
     let own = points.len();
     let mut arrived: BTreeMap<usize, Vec<f64>> =
@@ -88,14 +88,14 @@ pub fn settle<const D: usize>(
     let located = append_cells(grid, points, &mut cells);
     // A point that lies in another cell than the one it was made for is sent after all.
     let strays = located.is_err() || cells[own..].iter().any(|&cell| !wanted(cell));
-    let complete = world.sum_usize(made) == world.sum_usize(leaving.len());
+    let complete = world.sum_usize(made) == moved;
     if world.any(strays) || !complete {
         points.truncate(own);
         cells.truncate(own);
         return migrate_from(world, partition, grid, points, cells);
     }
     sort_by_cell(points, &cells, Some(staying(own, points.len(), &leaving)));
-    Ok(world.sum_usize(leaving.len()))
+    Ok(moved)
 }
 
 /// The points that stay of `own`, and those that came after them.
