@@ -136,19 +136,15 @@ impl<const D: usize> Discretisation<D> {
         let basis = model.deck.method.basis;
         let influences = world.fail_together(basis::map_points(grid, basis, points))?;
         let groups = Groups::new(&influences);
-        let populated = Populated::find(world, grid, partition, basis, points)?;
+        let populated = Populated::find(world, grid, partition, basis, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {
             Coupling::Matrix | Coupling::Mass => find_faces(world, model, &populated)?,
             Coupling::Diagonal => Default::default(),
         };
 
+        // A point's nodes are those of the cells it populates.
         let mut reached: Vec<usize> =
             faces.iter().flat_map(|face| face.nodes.iter().copied()).collect();
-        // A point's nodes are those of the cells it populates; on a mesh, a point in a face may
-        // be found now in one of its cells and now in the other.
-        if matches!(grid, Grid::Mesh(_)) {
-            reached.extend_from_slice(&groups.nodes);
-        }
         append_nodes(world, grid, &populated, &mut reached);
         let touched = Touched::settle(world, grid, partition, reached)?;
         let supports = (0..groups.len())
@@ -267,7 +263,7 @@ pub fn active<const D: usize>(
     points: &Points<D>,
 ) -> Result<(Populated, Touched)> {
     let (grid, partition) = (&model.grid, &model.partition);
-    let populated = Populated::find(world, grid, partition, model.deck.method.basis, points)?;
+    let populated = Populated::find(world, grid, partition, model.deck.method.basis, points, None)?;
     let mut reached = Vec::new();
     append_nodes(world, grid, &populated, &mut reached);
     let touched = Touched::settle(world, grid, partition, reached)?;

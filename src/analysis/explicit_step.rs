@@ -79,9 +79,9 @@ pub(super) fn advance<const D: usize>(
     let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();
     let deforming = again.as_ref().unwrap_or(&displacement);
     let (deformation, energies) = first.unzip();
-    let made =
+    let mut made =
         clock.time(Phase::Update, || Ok(increments(step, &moved, deforming, deformation)))?;
-    clock.time(Phase::Update, || Ok(refuse(world, model, &mesh, points, &made, &moved)))??;
+    clock.time(Phase::Update, || Ok(refuse(world, model, &mesh, points, &mut made, &moved)))??;
 
     let residual = residual(&mass, &mesh, &acceleration, &pushed);
     let work = point_work(&external, &made.displacement)
@@ -99,7 +99,7 @@ pub(super) fn advance<const D: usize>(
             method.domain_update,
             &mesh.numbering,
             &moved,
-            &made.deformation,
+            &made,
             points,
         );
         world.fail_together(followed)?;
@@ -151,15 +151,14 @@ fn increments<const D: usize>(
     deforming: &[f64],
     deformation: Option<Vec<Square<D>>>,
 ) -> Increments<D> {
-    match deformation {
-        Some(deformation) => {
-            Increments { deformation, displacement: mapping::at_points(step, moved) }
-        }
-        None if deforming == moved => update::increments(step, moved),
-        None => Increments {
-            deformation: mapping::deformation_increments(step, deforming),
-            displacement: mapping::at_points(step, moved),
-        },
+    if deformation.is_none() && deforming == moved {
+        return update::increments(step, moved);
+    }
+    Increments {
+        deformation: deformation
+            .unwrap_or_else(|| mapping::deformation_increments(step, deforming)),
+        displacement: mapping::at_points(step, moved),
+        corners: Vec::new(),
     }
 }
 
@@ -169,7 +168,7 @@ fn refuse<const D: usize>(
     model: &Model<D>,
     mesh: &Discretisation<D>,
     points: &Points<D>,
-    made: &Increments<D>,
+    made: &mut Increments<D>,
     moved: &[f64],
 ) -> std::result::Result<(), Halt> {
     let (grid, method) = (&model.grid, &model.deck.method);
@@ -178,11 +177,12 @@ fn refuse<const D: usize>(
     }
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
-    let still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
+    let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
         deformation: vec![identity(); points.len()],
         displacement: made.displacement.clone(),
+        corners: Vec::new(),
     });
-    let made = still.as_ref().unwrap_or(made);
+    let made = still.as_mut().unwrap_or(made);
     let numbering = &mesh.numbering;
     match update::unsound_domain(world, [grid; 2], method.basis, numbering, moved, points, made) {
         Some(why) => Err(Error::Run(why).into()),

@@ -173,44 +173,46 @@ fn solve_step<const D: usize>(
     let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
     let mass =
         clock.time(Phase::Assemble, || GridMass::assemble(world, &mesh, step, deck.method.mass))?;
-    let loads = Loads::of_step(world, model, points, &mesh, span)?;
+    let loads =
+        clock.time(Phase::Assemble, || Loads::of_step(world, model, points, &mesh, span))?;
     let start = clock.time(Phase::Solve, || {
         let held = held_or_left_out::<D>(&conditions, &left_out);
         let inverse = mass.inverse(world, &model.grid, &mesh, &held)?;
         rates_at_start(inverse, step, points, &conditions, &loads, span)
     })?;
 
-    let mut driving = mass.multiply(&mesh, &newmark.predictor(&start));
-    let share = 1.0 + newmark.alpha;
-    for (dof, force) in driving.iter_mut().enumerate() {
-        *force += share * loads.external_end[dof] - newmark.alpha * loads.balance_start[dof];
-    }
-    let inertia = Inertia { share, matrix: mass.scaled(&mesh, newmark.stiffness()) };
-    let problem = Equilibrium::new(
-        world,
-        &model.grid,
-        &mesh,
-        step,
-        &conditions,
-        &left_out,
-        driving.clone(),
-        newton::settings(model),
-    )?
-    .with_inertia(inertia);
+    let (driving, problem) = clock.time(Phase::Assemble, || {
+        let mut driving = mass.multiply(&mesh, &newmark.predictor(&start));
+        let share = 1.0 + newmark.alpha;
+        for (dof, force) in driving.iter_mut().enumerate() {
+            *force += share * loads.external_end[dof] - newmark.alpha * loads.balance_start[dof];
+        }
+        let inertia = Inertia { share, matrix: mass.scaled(&mesh, newmark.stiffness()) };
+        let problem = Equilibrium::new(
+            world,
+            &model.grid,
+            &mesh,
+            step,
+            &conditions,
+            &left_out,
+            driving.clone(),
+            newton::settings(model),
+        )?;
+        Ok((driving, problem.with_inertia(inertia)))
+    })?;
     let solved = newton::solve(world, model, &mesh, points, problem, recorder, clock, number)?;
     let solved = match solved {
         Ok(solved) => solved,
         Err(why) => return Ok(Err(why)),
     };
     let displacement = solved.displacement;
-    let Carried { made, moved_grid } =
-        match newton::carried(world, model, &mesh, points, &displacement, span)? {
-            Ok(carried) => carried,
-            Err(why) => return Ok(Err(why)),
-        };
+    let carry = || newton::carried(world, model, &mesh, points, &displacement, span);
+    let Carried { made, moved_grid } = match clock.time(Phase::Update, carry)? {
+        Ok(carried) => carried,
+        Err(why) => return Ok(Err(why)),
+    };
 
     let end = newmark.rates(&start, &displacement);
-    let rates = PointRates::new(step, points, &start, &end, deck.method.flip);
     // What the boundaries supply.
     let supplied: Vec<f64> =
         solved.internal.iter().zip(&driving).map(|(force, driving)| force - driving).collect();
@@ -222,7 +224,9 @@ fn solve_step<const D: usize>(
         [&supplied, &supplied],
     );
     let ghost = mass.ghost_energy(&mesh, &end.velocity);
-    clock.time(Phase::Update, || {
+    let energies = clock.time(Phase::Update, || {
+        let step = mesh.step_points(points, &model.materials);
+        let rates = PointRates::new(step, points, &start, &end, deck.method.flip);
         let updated = update::apply(
             &model.grid,
             &model.materials,
@@ -233,11 +237,12 @@ fn solve_step<const D: usize>(
             &made,
             points,
         );
-        world.fail_together(updated)
+        world.fail_together(updated)?;
+        (points.velocity, points.acceleration) = (rates.velocity, rates.acceleration);
+        Ok(update::energies(points, &model.materials))
     })?;
-    (points.velocity, points.acceleration) = (rates.velocity, rates.acceleration);
 
-    let sums = StepSums { energies: update::energies(points, &model.materials), ghost, work };
+    let sums = StepSums { energies, ghost, work };
     let reaction = at_held(&conditions, &supplied);
     let row = HistoryRow {
         step: number,

@@ -122,7 +122,7 @@ pub fn carried<const D: usize>(
     span: StepSpan,
 ) -> Result<std::result::Result<Carried<D>, String>> {
     let (deck, grid, numbering) = (&model.deck, &model.grid, &mesh.numbering);
-    let made = update::increments(mesh.step_points(points, &model.materials), displacement);
+    let mut made = update::increments(mesh.step_points(points, &model.materials), displacement);
     let moved_grid = match motion::moved(world, deck, grid, numbering, displacement, span)? {
         Ok(moved_grid) => moved_grid,
         Err(why) => return Ok(Err(why)),
@@ -132,7 +132,7 @@ pub fn carried<const D: usize>(
     let refused = update::reason_to_refuse(world, after, points, &made).map(|refusal| refusal.why);
     let unsound = refused.or_else(|| {
         let grids = [grid, after];
-        update::unsound_domain(world, grids, basis, numbering, displacement, points, &made)
+        update::unsound_domain(world, grids, basis, numbering, displacement, points, &mut made)
     });
     Ok(match unsound {
         Some(why) => Err(why),

@@ -134,20 +134,22 @@ fn solve_step<const D: usize>(
         let forces = model.point_forces(world, points, factor, time)?;
         owned_forces(world, numbering, &mesh, &forces)
     };
-    let external_start = external(span.factor_start, span.time_start)?;
-    let external_end = external(span.factor_end, span.time_end)?;
-    let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
-    let step = mesh.step_points(points, &model.materials);
-    let problem = Equilibrium::new(
-        world,
-        &model.grid,
-        &mesh,
-        step,
-        &conditions,
-        &left_out,
-        external_end.clone(),
-        newton::settings(model),
-    )?;
+    let (external_start, external_end, problem) = clock.time(Phase::Assemble, || {
+        let external_start = external(span.factor_start, span.time_start)?;
+        let external_end = external(span.factor_end, span.time_end)?;
+        let left_out = mesh.nodes_left_out(world, deck.method.drop_below);
+        let problem = Equilibrium::new(
+            world,
+            &model.grid,
+            &mesh,
+            mesh.step_points(points, &model.materials),
+            &conditions,
+            &left_out,
+            external_end.clone(),
+            newton::settings(model),
+        )?;
+        Ok((external_start, external_end, problem))
+    })?;
     let solved = newton::solve(world, model, &mesh, points, problem, recorder, clock, number)?;
     let solved = match solved {
         Ok(solved) => solved,
@@ -155,11 +157,11 @@ fn solve_step<const D: usize>(
     };
     let (displacement, internal) = (solved.displacement, solved.internal);
 
-    let carried = match newton::carried(world, model, &mesh, points, &displacement, span)? {
+    let carry = || newton::carried(world, model, &mesh, points, &displacement, span);
+    let Carried { made, moved_grid } = match clock.time(Phase::Update, carry)? {
         Ok(carried) => carried,
         Err(why) => return Ok(Err(why)),
     };
-    let Carried { made, moved_grid } = carried;
     let work = work_of_step::<D>(
         &conditions,
         numbering,
@@ -167,7 +169,7 @@ fn solve_step<const D: usize>(
         [&external_start, &external_end],
         [&solved.internal_start, &internal],
     );
-    clock.time(Phase::Update, || {
+    let energies = clock.time(Phase::Update, || {
         let updated = update::apply(
             &model.grid,
             &model.materials,
@@ -178,9 +180,9 @@ fn solve_step<const D: usize>(
             &made,
             points,
         );
-        world.fail_together(updated)
+        world.fail_together(updated)?;
+        Ok(update::energies(points, &model.materials))
     })?;
-    let energies = update::energies(points, &model.materials);
     let sums = world.sum_slice(&[energies.strain, energies.plastic, work]);
     let supplied: Vec<f64> =
         internal.iter().zip(&external_end).map(|(force, external)| force - external).collect();

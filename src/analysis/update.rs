@@ -24,6 +24,8 @@ pub struct Increments<const D: usize> {
     pub deformation: Vec<[[f64; D]; D]>,
     /// m
     pub displacement: Vec<[f64; D]>,
+    /// Where the corners of `cpdi2` domains go, m; empty until [`unsound_domain`] has found it.
+    pub corners: Vec<[[f64; D]; 8]>,
 }
 
 /// Energies of this rank's points, J (J/m in plane strain).
@@ -41,6 +43,7 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
     let mut made = Increments {
         deformation: Vec::with_capacity(count),
         displacement: Vec::with_capacity(count),
+        corners: Vec::new(),
     };
     for p in 0..count {
         let row = step.influences.row(p);
@@ -155,7 +158,8 @@ pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
 }
 
 /// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
-/// step, if any. `displacement`: local nodes, m. Collective.
+/// step, if any; otherwise `increments` learn where the corners of `cpdi2` go. `displacement`: local
+/// nodes, m. Collective.
 pub fn unsound_domain<const D: usize>(
     world: &World,
     [grid, after]: [&Grid<D>; 2],
@@ -163,18 +167,21 @@ pub fn unsound_domain<const D: usize>(
     numbering: &Numbering,
     displacement: &[f64],
     points: &Points<D>,
-    increments: &Increments<D>,
+    increments: &mut Increments<D>,
 ) -> Option<String> {
     if !matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
         return None;
     }
     let nodal = |node| nodal_displacement(numbering, displacement, node);
-    let check = |p: usize| match basis {
-        Basis::Cpdi2 => cpdi2::check_step(grid, after, points, p, &nodal),
-        _ => {
-            let (increment, moved) = (&increments.deformation[p], &increments.displacement[p]);
-            cpdi1::check_step(after, points, p, increment, moved)
+    let mut hint = None;
+    let mut check = |p: usize| -> Result<()> {
+        if basis == Basis::Cpdi2 {
+            let grids = [grid, after];
+            increments.corners.push(cpdi2::moved_corners(grids, points, p, &mut hint, &nodal)?);
+            return Ok(());
         }
+        let (increment, moved) = (&increments.deformation[p], &increments.displacement[p]);
+        cpdi1::check_step(after, points, p, increment, moved, &mut hint)
     };
     let reason = (0..points.len()).find_map(|p| check(p).err());
     world.first_message(reason.map(|error| error.to_string()))
@@ -205,7 +212,7 @@ pub fn apply<const D: usize>(
     points: &mut Points<D>,
 ) -> Result<()> {
     deform(materials, &increments.deformation, points);
-    follow(grid, basis, rule, numbering, displacement, &increments.deformation, points)?;
+    follow(grid, basis, rule, numbering, displacement, increments, points)?;
     move_points(&increments.displacement, points);
     Ok(())
 }
@@ -314,24 +321,26 @@ impl<const D: usize> Snapshot<D> {
 }
 
 /// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
-/// those of the step's start. `displacement` is the one that made the increments.
+/// those of the step's start. `displacement` is the one that made the increments, which
+/// [`unsound_domain`] has passed.
 pub fn follow<const D: usize>(
     grid: &Grid<D>,
     basis: Basis,
     rule: DomainUpdate,
     numbering: &Numbering,
     displacement: &[f64],
-    increments: &[[[f64; D]; D]],
+    increments: &Increments<D>,
     points: &mut Points<D>,
 ) -> Result<()> {
+    if basis == Basis::Cpdi2 {
+        points.corners.copy_from_slice(&increments.corners);
+    }
     let whole: Vec<Matrix3<f64>> = match rule {
-        DomainUpdate::NormalIncremental => increments.iter().map(embed).collect(),
+        DomainUpdate::NormalIncremental => increments.deformation.iter().map(embed).collect(),
         _ => Vec::new(),
     };
-    update_domains(grid, basis, rule, points, &whole, &|node| match numbering.local(node) {
-        Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
-        None => [0.0; D],
-    })
+    let nodal = |node| nodal_displacement(numbering, displacement, node);
+    update_domains(grid, basis, rule, points, &whole, &nodal)
 }
 
 /// Lagrangian eq. 31, Ghost eq. 9, 14.

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::basis;
+use crate::basis::{self, Influences};
 use crate::deck::model::Basis;
 use crate::error::Result;
 use crate::grid::Grid;
@@ -19,13 +19,15 @@ pub struct Populated {
 }
 
 impl Populated {
-    /// Finds the cells of this rank's points and unites them at their owners. Collective.
+    /// Finds the cells of this rank's points and unites them at their owners. `known`: the points'
+    /// influences, if they have been found. Collective.
     pub fn find<const D: usize>(
         world: &World,
         grid: &Grid<D>,
         partition: &Partition<D>,
         basis: Basis,
         points: &Points<D>,
+        known: Option<&Influences<D>>,
     ) -> Result<Self> {
         let mut met: Vec<(usize, u64)> = Vec::with_capacity(points.len());
         let mut cells = Vec::new();
@@ -33,7 +35,10 @@ impl Populated {
             for p in 0..points.len() {
                 cells.clear();
                 let near = met.last().map(|&(cell, _)| cell);
-                basis::populated_cells(grid, basis, points, p, near, &mut cells)?;
+                match known.and_then(|influences| influences.cells.of(p)) {
+                    Some(known) => cells.extend_from_slice(known),
+                    None => basis::populated_cells(grid, basis, points, p, near, &mut cells)?,
+                }
                 let body = 1 << points.body[p];
                 for &cell in &cells {
                     match met.last_mut() {

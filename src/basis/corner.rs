@@ -8,7 +8,7 @@
 
 use crate::error::{Error, Result};
 use crate::grid::locate::REACH;
-use crate::grid::{Grid, Interpolation};
+use crate::grid::{Grid, Values};
 use crate::points::Points;
 
 use super::Row;
@@ -60,7 +60,7 @@ pub(super) fn populated_cells<const D: usize>(
     Ok(())
 }
 
-/// Calls `visit` with each corner's number and the grid's basis there. Corners on a face count
+/// Calls `visit` with each corner's number and the basis's values there. Corners on a face count
 /// for the cell on the side of the domain's centre. `hint`: a cell near the first corner; left at
 /// that of the last.
 ///
@@ -71,13 +71,13 @@ pub(super) fn for_each_place<const D: usize>(
     p: usize,
     corners: &[[f64; D]; 8],
     hint: &mut Option<usize>,
-    mut visit: impl FnMut(usize, &Interpolation<D>),
+    mut visit: impl FnMut(usize, &Values),
 ) -> Result<()> {
     let corners = &corners[..1 << D];
     let centre =
         std::array::from_fn(|a| corners.iter().map(|x| x[a]).sum::<f64>() / corners.len() as f64);
     for (corner, x) in corners.iter().enumerate() {
-        let at = grid.interpolate_towards(x, &centre, REACH, *hint).ok_or_else(|| {
+        let at = grid.values_towards(x, &centre, REACH, *hint).ok_or_else(|| {
             Error::Run(format!(
                 "corner {} of point {} is outside the grid at {x:?} m (the point is at {:?} m); \
                  enlarge the grid, or let the mesh follow the body",

@@ -93,7 +93,8 @@ pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D
 }
 
 /// Whether the step leaves point `p` a sound domain inside `after`, the grid of the next step:
-/// `increment` is the step's dF and `displacement` the point's, m.
+/// `increment` is the step's dF and `displacement` the point's, m. `hint`: a cell near the first
+/// corner; left at that of the last.
 ///
 /// Errors: a corner outside `after`.
 pub fn check_step<const D: usize>(
@@ -102,11 +103,12 @@ pub fn check_step<const D: usize>(
     p: usize,
     increment: &[[f64; D]; D],
     displacement: &[f64; D],
+    hint: &mut Option<usize>,
 ) -> Result<()> {
     let before = half_edges(points, p);
     let edges: [[f64; D]; D] = std::array::from_fn(|i| {
         std::array::from_fn(|j| (0..D).map(|k| increment[i][k] * before[k][j]).sum())
     });
     let centre = std::array::from_fn(|a| points.position[p][a] + displacement[a]);
-    for_each_place(after, points, p, &positions(&centre, &edges), &mut None, |_, _| ())
+    for_each_place(after, points, p, &positions(&centre, &edges), hint, |_, _| ())
 }

@@ -119,27 +119,14 @@ fn sound<const D: usize>(
     )))
 }
 
-/// Moves the corners of all points with the step's nodal displacement (m, zero where no
-/// equation lives), before the mesh moves (Rotation §2 (vii)). It is asked only for nodes in
-/// the point's own row. Corners that domains share stay shared up to round-off.
+/// Where the step's nodal displacement (m, zero where no equation lives) takes the corners of point
+/// `p`, m, before the mesh moves (Rotation §2 (vii)). It is asked only for nodes in the point's own
+/// row. Corners that domains share stay shared up to round-off. `after`: the grid of the next step.
+/// `hint`: a cell near the first corner; left at that of the last.
 ///
-/// Errors: a corner outside the grid; a domain that is inverted by the displacement.
-pub fn update_corners<const D: usize>(
-    grid: &Grid<D>,
-    points: &mut Points<D>,
-    displacement: &dyn Fn(usize) -> [f64; D],
-) -> Result<()> {
-    let mut hint = None;
-    for p in 0..points.len() {
-        points.corners[p] = moved_corners(grid, points, p, &mut hint, displacement)?;
-        corners(points, p)?;
-    }
-    Ok(())
-}
-
-/// Where the step takes the corners of point `p`, m. Error: a corner outside the grid.
-fn moved_corners<const D: usize>(
-    grid: &Grid<D>,
+/// Errors: a corner outside the grid, or outside `after`; a domain that the step inverts.
+pub fn moved_corners<const D: usize>(
+    [grid, after]: [&Grid<D>; 2],
     points: &Points<D>,
     p: usize,
     hint: &mut Option<usize>,
@@ -154,23 +141,9 @@ fn moved_corners<const D: usize>(
             }
         }
     })?;
-    Ok(moved)
-}
-
-/// Whether the step leaves point `p` a sound domain inside `after`, the grid of the next step.
-///
-/// Errors: as of [`update_corners`], and a corner outside `after`.
-pub fn check_step<const D: usize>(
-    grid: &Grid<D>,
-    after: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    displacement: &dyn Fn(usize) -> [f64; D],
-) -> Result<()> {
-    let mut hint = None;
-    let moved = moved_corners(grid, points, p, &mut hint, displacement)?;
     sound(points, p, &moved)?;
-    for_each_place(after, points, p, &moved, &mut hint, |_, _| ())
+    for_each_place(after, points, p, &moved, hint, |_, _| ())?;
+    Ok(moved)
 }
 
 #[cfg(test)]

@@ -265,7 +265,7 @@ fn a_rectangle_inside_a_box_cell_gives_the_standard_functions() {
         let both: [Influence<D>; 2] = [influence1, influence2];
         for basis in both {
             basis(grid, &points, 0, &mut row).unwrap();
-            assert_eq!(row.cells(), [at.cell]);
+            assert_eq!(row.cells(), [at.values.cell]);
             assert_eq!(row.entries().len(), 1 << D);
             for (p, q) in plain.entries().iter().zip(row.entries()) {
                 assert_eq!(p.0, q.0);
@@ -327,10 +327,9 @@ fn moved_corners_have_the_area_of_the_mean_gradient() {
         }
     }
     points.deformation_gradient[0] = increment;
-    let before = points.corners[0];
-    update_corners(&grid, &mut points, &u).unwrap();
-    assert!((points.corners[0][2][0] - before[2][0]).abs() > 0.01);
-    assert!((volume(&points.corners[0]) - points.volume(0)).abs() < 1e-13);
+    let moved = moved_corners([&grid; 2], &points, 0, &mut None, &u).unwrap();
+    assert!((moved[2][0] - points.corners[0][2][0]).abs() > 0.01);
+    assert!((volume(&moved) - points.volume(0)).abs() < 1e-13);
 }
 
 #[test]
@@ -339,9 +338,10 @@ fn corners_follow_linear_fields_exactly_on_any_grid() {
     let grid = Grid::Mesh(mesh);
     let field = |x: [f64; 2]| [0.1 + 0.02 * x[0] - 0.03 * x[1], -0.2 + 0.01 * x[0]];
     let shifted: Vec<[f64; 2]> = QUAD.iter().map(|x| [x[0] + 6.5, x[1] - 1.0]).collect();
-    let mut points = polygon(&shifted);
-    update_corners(&grid, &mut points, &|n| field(grid.node_position(n))).unwrap();
-    for (corner, x) in points.corners[0].iter().zip(&shifted) {
+    let points = polygon(&shifted);
+    let nodal = |n| field(grid.node_position(n));
+    let moved = moved_corners([&grid; 2], &points, 0, &mut None, &nodal).unwrap();
+    for (corner, x) in moved.iter().zip(&shifted) {
         let u = field(*x);
         assert!((corner[0] - x[0] - u[0]).abs() < 1e-13);
         assert!((corner[1] - x[1] - u[1]).abs() < 1e-13);
@@ -407,7 +407,7 @@ fn inverted_domains_are_refused() {
     // The displacement that turns a domain over is caught when it happens.
     points.corners[0] = rectangle_corners([0.5, 1.5], [0.2, 0.2]);
     let fold = |node: usize| [-2.0 * (grid.node_position(node)[0] - 0.5), 0.0];
-    assert!(update_corners(&grid, &mut points, &fold).is_err());
+    assert!(moved_corners([&grid; 2], &points, 0, &mut None, &fold).is_err());
 }
 
 /// Seeding puts CPDI2 points where its functions put them, and volumes agree.

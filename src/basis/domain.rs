@@ -25,8 +25,8 @@ use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 use crate::tensor::spectral::square_root;
 
-/// Updates `points.half_length` at the end of a step: after `deformation_gradient` has become
-/// that of the step's end, while `position` and `half_length` are still those of its start.
+/// Updates `points.half_length` at the end of a step: after `deformation_gradient`, and the corners
+/// of `cpdi2`, have become those of the step's end, while `position` and `half_length` are still those of its start.
 ///
 /// `increments` holds dF, one for each point (only read, and else may be empty, for
 /// `normal-incremental`), `displacement` gives the step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
@@ -42,9 +42,6 @@ pub fn update_domains<const D: usize>(
     increments: &[Matrix3<f64>],
     displacement: &dyn Fn(usize) -> [f64; D],
 ) -> Result<()> {
-    if basis == Basis::Cpdi2 {
-        super::cpdi2::update_corners(grid, points, displacement)?;
-    }
     if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
         for p in 0..points.len() {
             let corners = match basis {

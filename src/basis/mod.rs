@@ -46,6 +46,30 @@ pub struct Influences<const D: usize> {
     pub weights: Vec<f64>,
     /// 1/m
     pub gradients: Vec<[f64; D]>,
+    /// Where the nodes come from, if that took a search.
+    pub cells: Cells,
+}
+
+/// Cells of each point, ascending, in compressed rows; no rows where arithmetic finds them.
+#[derive(Debug, Clone, Default)]
+pub struct Cells {
+    /// End of each row.
+    ends: Vec<usize>,
+    cells: Vec<usize>,
+}
+
+impl Cells {
+    fn push(&mut self, cells: &[usize]) {
+        self.cells.extend_from_slice(cells);
+        self.ends.push(self.cells.len());
+    }
+
+    /// Those of point `p`.
+    pub fn of(&self, p: usize) -> Option<&[usize]> {
+        let end = *self.ends.get(p)?;
+        let start = if p == 0 { 0 } else { self.ends[p - 1] };
+        Some(&self.cells[start..end])
+    }
 }
 
 impl<const D: usize> Influences<D> {
@@ -59,6 +83,7 @@ impl<const D: usize> Influences<D> {
             nodes: Vec::with_capacity(entries),
             weights: Vec::with_capacity(entries),
             gradients: Vec::with_capacity(entries),
+            cells: Cells::default(),
         }
     }
 
@@ -114,8 +139,9 @@ pub fn map_points<const D: usize>(
 }
 
 /// Appends the cells populated by point `p`: strictly overlapped by its domain, or holding it.
-/// Their nodes together are the nodes of row `p` of [`map_points`]. A `hint`, a cell near the
-/// point, saves a search on a mesh; it never changes the answer.
+/// Their nodes together are the nodes of row `p` of [`map_points`], which may have kept them
+/// ([`Influences::cells`]). A `hint`, a cell near the point, saves a search on a mesh; it never
+/// changes the answer.
 pub fn populated_cells<const D: usize>(
     grid: &Grid<D>,
     basis: Basis,

@@ -63,7 +63,7 @@ fn map_points_on_mesh<const D: usize>(grid: &Grid<D>, points: &Points<D>) -> Res
     row::map_points(points, |p, row| {
         let x = &points.position[p];
         let at = grid.interpolate(x, REACH, hint).ok_or_else(|| outside(grid, points, p))?;
-        hint = Some(at.cell);
+        hint = Some(at.values.cell);
         row.clear();
         row.add_place(&at);
         row.merge();

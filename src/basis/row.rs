@@ -1,7 +1,7 @@
 //! One point's nodes while they are collected from several places.
 
 use crate::error::Result;
-use crate::grid::Interpolation;
+use crate::grid::{Interpolation, Values};
 use crate::points::Points;
 
 use super::Influences;
@@ -22,14 +22,15 @@ impl<const D: usize> Row<D> {
 
     /// Adds S = N(x) and dS = grad N(x) of a place: the standard functions.
     pub fn add_place(&mut self, at: &Interpolation<D>) {
-        self.cells.push(at.cell);
-        for a in 0..at.count {
-            self.entries.push((at.nodes[a], at.weights[a], at.gradients[a]));
+        let values = &at.values;
+        self.cells.push(values.cell);
+        for a in 0..values.count {
+            self.entries.push((values.nodes[a], values.weights[a], at.gradients[a]));
         }
     }
 
     /// Adds a corner: S += `weight` N(x) and dS += `gradient` N(x).
-    pub fn add_corner(&mut self, at: &Interpolation<D>, weight: f64, gradient: &[f64; D]) {
+    pub fn add_corner(&mut self, at: &Values, weight: f64, gradient: &[f64; D]) {
         self.cells.push(at.cell);
         for (&node, &n) in at.nodes.iter().zip(&at.weights).take(at.count) {
             self.entries.push((node, weight * n, gradient.map(|g| g * n)));
@@ -77,6 +78,7 @@ pub(super) fn map_points<const D: usize>(
             influences.push(*node, *weight, *gradient);
         }
         influences.close_row();
+        influences.cells.push(row.cells());
     }
     Ok(influences)
 }

@@ -321,6 +321,7 @@ fn groups_tell_rows_with_equal_ends_apart() {
         nodes: vec![1, 4, 9, 1, 5, 9, 1, 4, 9, 1, 6, 9],
         weights: vec![0.0; 12],
         gradients: vec![[0.0; 2]; 12],
+        ..Influences::default()
     };
     let groups = Groups::new(&influences);
     assert_eq!(groups.group_of_point, [0, 1, 0, 2, 3]);

@@ -200,37 +200,6 @@ pub fn gradients<const D: usize>(
     Some((out, determinant(&j)))
 }
 
-/// The reference coordinates xi with x(xi) = `x`: direct for simplices, Newton otherwise.
-/// `None` where the iteration leaves the neighbourhood of the cell or meets a singular J;
-/// the answer may lie outside the reference cell. Error of xi: a few round-offs.
-pub fn inverse_map<const D: usize>(
-    element: Element,
-    nodes: &[[f64; D]],
-    x: &[f64; D],
-) -> Option<[f64; D]> {
-    const STEPS: usize = 30;
-    let mut xi = element.reference_centre::<D>();
-    for _ in 0..STEPS {
-        let at = position(element, nodes, &xi);
-        let inverse = inverse(&jacobian(nodes, &element.shape_gradients(&xi)))?;
-        let mut step = 0.0f64;
-        for (xi, row) in xi.iter_mut().zip(&inverse) {
-            let delta: f64 = (0..D).map(|k| row[k] * (x[k] - at[k])).sum();
-            *xi += delta;
-            step = step.max(delta.abs());
-        }
-        // Quadratic convergence: the error left behind is of the order of step^2. A second
-        // pass over a simplex removes the round-off of the first.
-        if step < 1e-9 {
-            return Some(xi);
-        }
-        if !(xi.iter().all(|xi| xi.abs() < 8.0)) {
-            return None;
-        }
-    }
-    None
-}
-
 /// Determinant of a 2 x 2 or 3 x 3 matrix, rows first.
 pub(crate) fn determinant<const D: usize>(m: &[[f64; D]; D]) -> f64 {
     if D == 2 {
@@ -268,21 +237,6 @@ pub(crate) fn inverse<const D: usize>(m: &[[f64; D]; D]) -> Option<[[f64; D]; D]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
-
-    fn distorted_quad() -> Vec<[f64; 2]> {
-        vec![[0.1, -0.2], [2.0, 0.3], [1.7, 1.9], [-0.3, 1.2]]
-    }
-
-    fn distorted_hex() -> Vec<[f64; 3]> {
-        (0..8)
-            .map(|a| {
-                let r = Element::Hex8.reference_node::<3>(a);
-                let wobble = [0.17, -0.11, 0.05, 0.2, -0.15, 0.08, 0.1, -0.2][a];
-                [r[0] + wobble, 0.7 * r[1] - wobble + 0.3 * r[0], 1.3 * r[2] + 0.5 * wobble]
-            })
-            .collect()
-    }
 
     #[test]
     fn faces_are_named_by_the_side_they_are_on() {
@@ -304,35 +258,6 @@ mod tests {
         each::<2>(Element::Quad4);
         each::<3>(Element::Tet4);
         each::<3>(Element::Hex8);
-    }
-
-    fn check<const D: usize>(element: Element, nodes: &[[f64; D]], xi: [f64; D]) {
-        let x = position(element, nodes, &xi);
-        let found = inverse_map(element, nodes, &x).unwrap();
-        for a in 0..D {
-            assert!((found[a] - xi[a]).abs() < 1e-12, "{element:?} {xi:?} {found:?}");
-        }
-        // Partition of unity and linear reproduction of the gradients.
-        let n = element.shape(&xi);
-        assert!((n.iter().sum::<f64>() - 1.0).abs() < 1e-14);
-        let (dn, _) = gradients(element, nodes, &xi).unwrap();
-        for i in 0..D {
-            for j in 0..D {
-                let d: f64 = nodes.iter().zip(&dn).map(|(x, dn)| x[i] * dn[j]).sum();
-                assert!((d - f64::from(u8::from(i == j))).abs() < 1e-12);
-            }
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn inverse_map_undoes_the_map_inside_and_near_the_cell(a in -1.3..1.3f64, b in -1.3..1.3f64, c in -1.3..1.3f64) {
-            check(Element::Quad4, &distorted_quad(), [a, b]);
-            check(Element::Hex8, &distorted_hex(), [a, b, c]);
-            check(Element::Tri3, &distorted_quad()[..3], [a, b]);
-            let hex = distorted_hex();
-            check(Element::Tet4, &[hex[0], hex[1], hex[3], hex[4]], [a, b, c]);
-        }
     }
 
     #[test]

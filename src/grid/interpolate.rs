@@ -1,13 +1,14 @@
 //! The grid's own basis S_i(x) and its gradient at a place, on either grid (Ghost §2.5).
 
 use super::element;
+use super::inverse_map::inverse_map_from;
 use super::lattice::CELL_CORNERS;
 use super::locate::{EDGE_TOLERANCE, REACH};
 use super::{Grid, Lattice, Mesh};
 
-/// The basis at one place: a cell and its nodes in cell order.
+/// The basis's values at one place: a cell and its nodes in cell order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Interpolation<const D: usize> {
+pub struct Values {
     pub cell: usize,
     /// How many entries of the arrays count.
     pub count: usize,
@@ -15,6 +16,12 @@ pub struct Interpolation<const D: usize> {
     pub nodes: [usize; 8],
     /// N_a(x)
     pub weights: [f64; 8],
+}
+
+/// The basis at one place.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Interpolation<const D: usize> {
+    pub values: Values,
     /// dN_a/dx, 1/m
     pub gradients: [[f64; D]; 8],
 }
@@ -37,21 +44,24 @@ impl<const D: usize> Grid<D> {
             }
             Grid::Mesh(mesh) => {
                 let (cell, xi) = mesh.locate_near(x, allowance, hint)?;
-                basis_on_mesh(mesh, cell, &xi)
+                let positions = mesh.cell_positions(cell);
+                let nodes = &positions[..mesh.element.node_count()];
+                let (gradients, _) = element::gradients(mesh.element, nodes, &xi)?;
+                Some(Interpolation { values: values_on_mesh(mesh, cell, &xi), gradients })
             }
         }
     }
 
-    /// As [`Self::interpolate`] for a place on the rim of a region about `centre`: on a face of
-    /// the grid the cell on the side of `centre` is taken, so that a region which fills its
+    /// The values of [`Self::interpolate`] for a place on the rim of a region about `centre`: on a
+    /// face of the grid the cell on the side of `centre` is taken, so that a region which fills its
     /// cells does not reach into those it merely touches.
-    pub fn interpolate_towards(
+    pub fn values_towards(
         &self,
         x: &[f64; D],
         centre: &[f64; D],
         allowance: f64,
         hint: Option<usize>,
-    ) -> Option<Interpolation<D>> {
+    ) -> Option<Values> {
         const NUDGE: f64 = 1e-6;
         let inner = std::array::from_fn(|a| x[a] + NUDGE * (centre[a] - x[a]));
         match self {
@@ -59,14 +69,14 @@ impl<const D: usize> Grid<D> {
                 // The place itself must be within reach, too.
                 lattice_cell(lattice, x, allowance)?;
                 let cell = lattice_cell(lattice, &inner, allowance)?;
-                Some(basis_on_lattice(lattice, cell, x))
+                Some(values_on_lattice(lattice, cell, &within(lattice, cell, x)))
             }
             Grid::Mesh(mesh) => {
-                let (cell, _) = mesh.locate_near(&inner, allowance, hint)?;
+                let (cell, near) = mesh.locate_near(&inner, allowance, hint)?;
                 let positions = mesh.cell_positions(cell);
                 let nodes = &positions[..mesh.element.node_count()];
-                let xi = element::inverse_map(mesh.element, nodes, x)?;
-                basis_on_mesh(mesh, cell, &xi)
+                let xi = inverse_map_from(mesh.element, nodes, x, near)?;
+                Some(values_on_mesh(mesh, cell, &xi))
             }
         }
     }
@@ -96,38 +106,46 @@ fn basis_on_lattice<const D: usize>(
     low: [usize; D],
     x: &[f64; D],
 ) -> Interpolation<D> {
-    let local: [f64; D] = std::array::from_fn(|a| lattice.scaled(a, x[a]) - low[a] as f64);
-    let mut out = Interpolation {
-        cell: lattice.cell_at(low),
-        count: 1 << D,
-        nodes: [0; 8],
-        weights: [0.0; 8],
-        gradients: [[0.0; D]; 8],
-    };
-    for (a, corner) in CELL_CORNERS.iter().enumerate().take(1 << D) {
-        let factor = |axis: usize| if corner[axis] == 1 { local[axis] } else { 1.0 - local[axis] };
-        out.nodes[a] = lattice.node_at(std::array::from_fn(|axis| low[axis] + corner[axis]));
-        out.weights[a] = (0..D).map(factor).product();
-        out.gradients[a] = std::array::from_fn(|axis| {
-            let others: f64 = (0..D).filter(|&b| b != axis).map(factor).product();
+    let local = within(lattice, low, x);
+    let mut gradients = [[0.0; D]; 8];
+    for (gradient, corner) in gradients.iter_mut().zip(&CELL_CORNERS).take(1 << D) {
+        *gradient = std::array::from_fn(|axis| {
+            let others = (0..D).filter(|&b| b != axis).map(|b| share(corner[b], local[b]));
             let slope = if corner[axis] == 1 { 1.0 } else { -1.0 };
-            slope * others / lattice.spacing[axis]
+            slope * others.product::<f64>() / lattice.spacing[axis]
         });
     }
-    out
+    Interpolation { values: values_on_lattice(lattice, low, &local), gradients }
 }
 
-fn basis_on_mesh<const D: usize>(
-    mesh: &Mesh<D>,
-    cell: usize,
-    xi: &[f64; D],
-) -> Option<Interpolation<D>> {
-    let count = mesh.element.node_count();
-    let positions = mesh.cell_positions(cell);
-    let (gradients, _) = element::gradients(mesh.element, &positions[..count], xi)?;
+/// `x` in units of the cell with index `low`, from its lower corner.
+fn within<const D: usize>(lattice: &Lattice<D>, low: [usize; D], x: &[f64; D]) -> [f64; D] {
+    std::array::from_fn(|a| lattice.scaled(a, x[a]) - low[a] as f64)
+}
+
+/// Along one axis: the function of the upper or lower end.
+fn share(upper: usize, local: f64) -> f64 {
+    if upper == 1 { local } else { 1.0 - local }
+}
+
+fn values_on_lattice<const D: usize>(
+    lattice: &Lattice<D>,
+    low: [usize; D],
+    local: &[f64; D],
+) -> Values {
+    let cell = lattice.cell_at(low);
+    let mut values = Values { cell, count: 1 << D, nodes: [0; 8], weights: [0.0; 8] };
+    for (a, corner) in CELL_CORNERS.iter().enumerate().take(1 << D) {
+        values.nodes[a] = lattice.node_at(std::array::from_fn(|axis| low[axis] + corner[axis]));
+        values.weights[a] = (0..D).map(|axis| share(corner[axis], local[axis])).product();
+    }
+    values
+}
+
+fn values_on_mesh<const D: usize>(mesh: &Mesh<D>, cell: usize, xi: &[f64; D]) -> Values {
     let mut nodes = [0; 8];
     for (out, &node) in nodes.iter_mut().zip(mesh.nodes_of(cell)) {
         *out = node as usize;
     }
-    Some(Interpolation { cell, count, nodes, weights: mesh.element.shape(xi), gradients })
+    Values { cell, count: mesh.element.node_count(), nodes, weights: mesh.element.shape(xi) }
 }

@@ -5,6 +5,7 @@
 //! [`EDGE_TOLERANCE`]) the lowest-numbered one wins, so the answer is the same on every rank.
 
 use super::element::{self, Element};
+use super::inverse_map::inverse_map;
 use super::mesh::Mesh;
 use super::topology::OUTSIDE;
 
@@ -173,7 +174,7 @@ impl<const D: usize> Mesh<D> {
         for _ in 0..STRIDES {
             let positions = self.cell_positions(cell);
             let nodes = &positions[..self.element.node_count()];
-            let xi = element::inverse_map(self.element, nodes, x)?;
+            let xi = inverse_map(self.element, nodes, x)?;
             if self.element.outside(&xi) < -EDGE_TOLERANCE {
                 return Some((cell, xi));
             }
@@ -239,7 +240,7 @@ impl<const D: usize> Mesh<D> {
         if (0..D).any(|a| x[a] < low[a] || x[a] > high[a]) {
             return None;
         }
-        let xi = element::inverse_map(self.element, nodes, x)?;
+        let xi = inverse_map(self.element, nodes, x)?;
         Some((xi, self.element.outside(&xi)))
     }
 }

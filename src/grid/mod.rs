@@ -7,7 +7,7 @@
 //! | `file` | Gmsh 4.1 reader | `gmsh.rs` |
 //! | `generate` | boxes and rings | `generate.rs` |
 //! | `motion` | rotation and following the material (Rotation §2 (viii)) | `motion.rs` |
-//! | `element` | shape functions, inverse maps | `element.rs` |
+//! | `element` | shape functions; inverse maps | `element.rs`, `inverse_map.rs` |
 //! | `points_per_cell`, `gauss` on a mesh | sub-cells and Gauss points | `quadrature.rs` |
 //!
 //! Behind them: `topology.rs` (neighbours), `check.rs` (what a mesh must satisfy), `locate.rs`
@@ -20,6 +20,7 @@ pub mod face;
 pub mod generate;
 pub mod gmsh;
 pub mod interpolate;
+pub mod inverse_map;
 pub mod lattice;
 pub mod locate;
 pub mod mesh;
@@ -31,7 +32,7 @@ mod topology;
 mod tests;
 
 pub use face::FaceJump;
-pub use interpolate::Interpolation;
+pub use interpolate::{Interpolation, Values};
 pub use lattice::Lattice;
 pub use mesh::Mesh;
 

@@ -255,6 +255,7 @@ pub fn gauss_legendre(n: usize) -> Vec<(f64, f64)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::inverse_map::inverse_map;
 
     /// Integral of x^p y^q z^r over the reference simplex: p! q! r! / (p + q + r + D)!.
     fn simplex_monomial(powers: &[u32], dimension: u32) -> f64 {
@@ -334,7 +335,7 @@ mod tests {
                 let edges = [1, 2, 4].map(|k: usize| std::array::from_fn(|a| c[k][a] - c[0][a]));
                 let own = element::determinant::<3>(&edges) / 6.0;
                 assert!((own - cell.volume).abs() < 1e-14, "orientation or volume: {own}");
-                let xi = element::inverse_map(Element::Tet4, &tet, &cell.position).unwrap();
+                let xi = inverse_map(Element::Tet4, &tet, &cell.position).unwrap();
                 assert!(Element::Tet4.outside(&xi) < 0.0);
                 volume += own;
                 for (sum, x) in centroid.iter_mut().zip(&cell.position) {

@@ -1,7 +1,7 @@
 //! Point location against a search through all cells, on edges, outside, and after motion.
 
 use super::super::Grid;
-use super::super::element;
+use super::super::inverse_map::inverse_map;
 use super::super::locate::{EDGE_TOLERANCE, REACH};
 use super::*;
 use crate::deck::model::MeshMotion;
@@ -11,7 +11,7 @@ fn brute<const D: usize>(mesh: &Mesh<D>, x: &[f64; D]) -> Option<usize> {
     (0..mesh.cell_count()).find(|&cell| {
         let positions = mesh.cell_positions(cell);
         let nodes = &positions[..mesh.element.node_count()];
-        element::inverse_map(mesh.element, nodes, x)
+        inverse_map(mesh.element, nodes, x)
             .is_some_and(|xi| mesh.element.outside(&xi) <= EDGE_TOLERANCE)
     })
 }
@@ -82,7 +82,7 @@ fn round_off_on_the_outer_edge_is_inside_and_more_is_not() {
     let lattice =
         Grid::Lattice(super::super::Lattice { origin: [0.0; 2], spacing: [h; 2], cells: [4, 4] });
     let at = lattice.interpolate(&[2.0 + 1e-10 * h, 1.1], 0.0, None).unwrap();
-    assert_eq!(at.cell, 11);
+    assert_eq!(at.values.cell, 11);
     assert!(lattice.interpolate(&[2.0 + 1e-8 * h, 1.1], 0.0, None).is_none());
 }
 
@@ -92,7 +92,7 @@ fn the_allowance_extends_outer_cells_linearly_and_no_further_than_asked() {
     let grid = Grid::Mesh(mesh);
     let x = [2.0 + 0.2 * 0.5, 1.1];
     assert!(grid.interpolate(&x, 0.1, None).is_none());
-    let at = grid.interpolate(&x, REACH, None).unwrap();
+    let at = grid.interpolate(&x, REACH, None).unwrap().values;
     assert_eq!(at.cell, 11);
     let field = |p: [f64; 2]| 1.0 + 2.0 * p[0] - 3.0 * p[1];
     let sum: f64 =

@@ -107,9 +107,9 @@ fn the_lattice_and_the_box_of_quads_agree() {
     let x = [1.31, 0.77];
     let (p, q) =
         (mesh.interpolate(&x, 0.0, None).unwrap(), lattice.interpolate(&x, 0.0, None).unwrap());
-    assert_eq!((p.cell, p.nodes), (q.cell, q.nodes));
+    assert_eq!((p.values.cell, p.values.nodes), (q.values.cell, q.values.nodes));
     for a in 0..4 {
-        assert!((p.weights[a] - q.weights[a]).abs() < 1e-13);
+        assert!((p.values.weights[a] - q.values.weights[a]).abs() < 1e-13);
         assert!((p.gradients[a][0] - q.gradients[a][0]).abs() < 1e-12);
         assert!((p.gradients[a][1] - q.gradients[a][1]).abs() < 1e-12);
     }
