@@ -24,6 +24,7 @@ use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
 use super::reactions::{at_held, reactions};
 use super::recorder::{Ending, Recorder};
+use super::solver::Trials;
 use super::step_end::{End, Solved};
 use super::stepping::Stepping;
 use super::time_step::stability_limit;
@@ -47,10 +48,11 @@ pub fn run<const D: usize>(
     let start =
         StepSums { energies: update::energies(points, &model.materials), ..StepSums::default() };
     let mut ledger = Ledger::new(&Entry::unite(world, points, start), wave_energy);
-    let mut ghost_energy = 0.0;
+    let (mut ghost_energy, mut trials) = (0.0, Trials::default());
     let mut framed = match recorder.resumed() {
         Some(state) => {
             stepping.restore(state)?;
+            trials.restore(state)?;
             ledger.restore(state)?;
             ghost_energy = state.number("ghost_energy")?;
             None
@@ -60,9 +62,10 @@ pub fn run<const D: usize>(
             Some(0)
         }
     };
-    let state_of = |stepping: &Stepping, ledger: &Ledger, ghost_energy: f64| {
+    let state_of = |stepping: &Stepping, trials: &Trials, ledger: &Ledger, ghost_energy: f64| {
         let mut state = RunState::new();
         stepping.save(&mut state);
+        trials.save(&mut state);
         ledger.save(&mut state);
         state.set("ghost_energy", ghost_energy);
         state
@@ -72,7 +75,8 @@ pub fn run<const D: usize>(
         let number = stepping.step_number();
         // The points are as they were where a step fails.
         before.record(points, model.deck.method.basis);
-        let outcome = match solve_step(world, model, points, recorder, clock, span, number) {
+        let outcome = solve_step(world, model, points, recorder, clock, &mut trials, span, number);
+        let outcome = match outcome {
             Ok(Ok(mut step)) => {
                 let entry = Entry::unite(world, points, step.sums);
                 match ledger.book(&entry, &mut step.solved.row) {
@@ -104,7 +108,7 @@ pub fn run<const D: usize>(
                     }
                 }
                 let completed = stepping.completed();
-                let state = state_of(&stepping, &ledger, ghost_energy);
+                let state = state_of(&stepping, &trials, &ledger, ghost_energy);
                 let time = span.time_start;
                 step_end::leave(world, model, points, recorder, framed, completed, time, state)?;
                 let end = format!("t = {:.6e} s", span.time_end);
@@ -126,7 +130,7 @@ pub fn run<const D: usize>(
         solved.row.energy_ghost += ghost_energy;
         solved.row.cuts = stepping.cuts;
         let end = End { number, label: span.time_end, moment, newton: true };
-        let state = state_of(&stepping, &ledger, ghost_energy);
+        let state = state_of(&stepping, &trials, &ledger, ghost_energy);
         let finished = step_end::finish(world, model, points, recorder, clock, solved, end, state)?;
         if finished.framed {
             framed = Some(number);
@@ -154,12 +158,14 @@ struct Step<const D: usize> {
 }
 
 /// One time step. The inner `Err` says why it is refused; points are then as they were.
+#[allow(clippy::too_many_arguments)]
 fn solve_step<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &mut Points<D>,
     recorder: &mut Recorder,
     clock: &mut Clock,
+    trials: &mut Trials,
     span: StepSpan,
     number: usize,
 ) -> Result<std::result::Result<Step<D>, String>> {
@@ -200,7 +206,8 @@ fn solve_step<const D: usize>(
         )?;
         Ok((driving, problem.with_inertia(inertia)))
     })?;
-    let solved = newton::solve(world, model, &mesh, points, problem, recorder, clock, number)?;
+    let solved =
+        newton::solve(world, model, &mesh, points, problem, recorder, clock, trials, number)?;
     let solved = match solved {
         Ok(solved) => solved,
         Err(why) => return Ok(Err(why)),

@@ -16,7 +16,7 @@ use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, NewtonSettings};
 use super::motion;
 use super::recorder::Recorder;
-use super::solver::{self, Linear};
+use super::solver::{self, Linear, Trials};
 use super::update::{self, Increments};
 
 /// A converged step. Vectors without other mention hold the owned degrees of freedom.
@@ -57,6 +57,7 @@ pub fn solve<const D: usize>(
     mut problem: Equilibrium<'_, D>,
     recorder: &mut Recorder,
     clock: &mut Clock,
+    trials: &mut Trials,
     number: usize,
 ) -> Result<std::result::Result<Converged, String>> {
     let numbering = &mesh.numbering;
@@ -72,6 +73,7 @@ pub fn solve<const D: usize>(
         // Domains that share corners leave cells with more nodes than those corners tell apart.
         !stabilised && model.deck.method.basis == Basis::Cpdi2,
         numbering.total * D,
+        trials,
         &mut matrix,
         &mut solution,
     )?;
@@ -142,20 +144,24 @@ pub fn carried<const D: usize>(
 
 /// Newton's method with the default solver; where that fails, once more from the start with the
 /// next stronger one, which is named. Collective.
+#[allow(clippy::too_many_arguments)]
 fn solve_robustly<const D: usize>(
     world: &World,
     problem: &mut Equilibrium<'_, D>,
     stabilised: bool,
     null_pivots: bool,
     equations: usize,
+    trials: &mut Trials,
     matrix: &mut Matrix,
     solution: &mut Vector,
 ) -> Result<(NewtonOutcome, Option<String>)> {
-    let linear = Linear::of::<D>(equations, stabilised);
+    let linear = Linear::of::<D>(equations, stabilised, trials);
     let most = problem.settings().max_evaluations;
     let mut snes = solver::newton(world, linear, null_pivots, most)?;
     let outcome = snes.solve(problem, matrix, solution)?;
-    let Some(stronger) = linear.stronger::<D>(equations).filter(|_| outcome.linear_failure) else {
+    trials.note(linear, !outcome.converged);
+    let stronger = linear.stronger::<D>(equations, outcome.linear_failure);
+    let Some(stronger) = stronger.filter(|_| !outcome.converged) else {
         return Ok((outcome, None));
     };
     let before = snes.ksp()?.describe()?;

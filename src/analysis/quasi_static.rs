@@ -19,6 +19,7 @@ use super::equilibrium::Equilibrium;
 use super::newton::Carried;
 use super::reactions::{at_held, reactions};
 use super::recorder::{Ending, Recorder};
+use super::solver::Trials;
 use super::step_end::{End, Solved};
 use super::stepping::Stepping;
 use super::{newton, step_end, update, verify};
@@ -35,30 +36,33 @@ pub fn run<const D: usize>(
     let analysis = &model.deck.analysis;
     let steps = analysis.steps.unwrap_or(1);
     let mut stepping = Stepping::new(steps, 0.0, analysis.on_failure, analysis.smallest_step);
-    let mut totals = Totals::default();
+    let (mut totals, mut trials) = (Totals::default(), Trials::default());
     match recorder.resumed() {
         Some(state) => {
             stepping.restore(state)?;
+            trials.restore(state)?;
             totals.restore(state)?;
         }
         None => recorder.frame(world, 0, 0.0, points)?,
     }
-    let state_of = |stepping: &Stepping, totals: &Totals| {
+    let state_of = |stepping: &Stepping, trials: &Trials, totals: &Totals| {
         let mut state = RunState::new();
         stepping.save(&mut state);
+        trials.save(&mut state);
         totals.save(&mut state);
         state
     };
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
-        let mut solved = match solve_step(world, model, points, recorder, clock, span, number)? {
+        let solved = solve_step(world, model, points, recorder, clock, &mut trials, span, number)?;
+        let mut solved = match solved {
             Ok(solved) => solved,
             Err(why) => {
                 recorder.log.say(&format!("step {number} refused: {why}"));
                 if stepping.refuse() {
                     continue;
                 }
-                let state = state_of(&stepping, &totals);
+                let state = state_of(&stepping, &trials, &totals);
                 recorder.keep_last_state(world, model, points, state)?;
                 return Ok(Ending::stopped(format!(
                     "step {number} of {steps} could not be solved: {why}; the last finished step \
@@ -72,7 +76,7 @@ pub fn run<const D: usize>(
         totals.add(&mut solved.row);
         solved.row.cuts = stepping.cuts;
         let end = End { number, label: span.factor_end, moment, newton: true };
-        let state = state_of(&stepping, &totals);
+        let state = state_of(&stepping, &trials, &totals);
         let finished = step_end::finish(world, model, points, recorder, clock, solved, end, state)?;
         if let Some(ending) = finished.stop {
             return Ok(ending);
@@ -116,12 +120,14 @@ impl Totals {
 
 /// One load step from `span.factor_start` to `factor_end`. The inner `Err` says why the step is
 /// refused; points are then as they were.
+#[allow(clippy::too_many_arguments)]
 fn solve_step<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &mut Points<D>,
     recorder: &mut Recorder,
     clock: &mut Clock,
+    trials: &mut Trials,
     span: StepSpan,
     number: usize,
 ) -> Result<std::result::Result<Solved<D>, String>> {
@@ -150,7 +156,8 @@ fn solve_step<const D: usize>(
         )?;
         Ok((external_start, external_end, problem))
     })?;
-    let solved = newton::solve(world, model, &mesh, points, problem, recorder, clock, number)?;
+    let solved =
+        newton::solve(world, model, &mesh, points, problem, recorder, clock, trials, number)?;
     let solved = match solved {
         Ok(solved) => solved,
         Err(why) => return Ok(Err(why)),

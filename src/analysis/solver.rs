@@ -2,14 +2,15 @@
 //! The user's PETSc options with the prefix `-qs_` win over all of it.
 //!
 //! The limits come from measurements (docs/performance.md). Ghost stiffness bounds the condition
-//! number, and multigrid wins early; without it multigrid may fail at any size, and a direct
-//! solver is kept for as long as a factorisation costs less than an attempt that fails. A parallel
+//! number, and multigrid wins early; without it multigrid may fail at any size, and nothing tells
+//! beforehand: it is tried, gives up early, and is left alone for some steps ([`Trials`]). A parallel
 //! direct solver sums in the order in which messages arrive; on one rank it repeats bit by bit, and
 //! is faster at these sizes too.
 
 use crate::assembly::{Numbering, Pattern};
 use crate::error::Result;
 use crate::grid::Grid;
+use crate::output::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
@@ -17,8 +18,12 @@ use crate::petsc::snes::Snes;
 /// Equations up to which the direct solver is the default in 2D and 3D, with Ghost stiffness:
 /// multigrid is faster from about a thousand on, but small studies like their residuals exact.
 const DIRECT_STABILISED: [usize; 2] = [10_000, 3_000];
-/// Without Ghost stiffness: 7 and 21 s for a factorisation, 1.8 and 1.6 GB.
-const DIRECT_UNSTABILISED: [usize; 2] = [400_000, 60_000];
+/// Without Ghost stiffness: from here on a factorisation costs about what a failed trial does.
+const DIRECT_UNSTABILISED: [usize; 2] = [20_000, 5_000];
+/// Iterations of a trial per solve; where multigrid converges without Ghost, it takes 10 to 70.
+const TRIAL: usize = 100;
+/// Steps after a failed trial that start with the direct solver.
+const PAUSE: u64 = 10;
 /// Up to here the direct solver runs on one rank.
 const ONE_RANK: [usize; 2] = [150_000, 30_000];
 
@@ -31,20 +36,56 @@ pub enum Linear {
     Direct,
     /// Conjugate gradients with smoothed aggregation and the rigid-body modes.
     Multigrid,
+    /// The same if it converges quickly.
+    Trial,
+}
+
+/// What trials have come to.
+#[derive(Debug, Default)]
+pub struct Trials {
+    /// Steps to come that do without one.
+    pause: u64,
+}
+
+impl Trials {
+    /// After a step that began with `linear`; `failed`: another had to end it.
+    pub fn note(&mut self, linear: Linear, failed: bool) {
+        self.pause = match linear {
+            Linear::Trial if failed => PAUSE,
+            _ => self.pause.saturating_sub(1),
+        };
+    }
+
+    pub fn save(&self, state: &mut RunState) {
+        state.set_count("solver.pause", self.pause);
+    }
+
+    pub fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.pause = state.count("solver.pause")?;
+        Ok(())
+    }
 }
 
 impl Linear {
     /// The default for a system of `equations` in `D` dimensions; `stabilised`: every body has
     /// Ghost stiffness.
-    pub fn of<const D: usize>(equations: usize, stabilised: bool) -> Self {
+    pub fn of<const D: usize>(equations: usize, stabilised: bool, trials: &Trials) -> Self {
         let at = usize::from(D == 3);
-        let direct = if stabilised { DIRECT_STABILISED[at] } else { DIRECT_UNSTABILISED[at] };
-        if equations > direct { Linear::Multigrid } else { Self::direct::<D>(equations) }
+        match stabilised {
+            true if equations > DIRECT_STABILISED[at] => Linear::Multigrid,
+            false if equations > DIRECT_UNSTABILISED[at] && trials.pause == 0 => Linear::Trial,
+            _ => Self::direct::<D>(equations),
+        }
     }
 
-    /// What to try when this one cannot solve a system; `None` for a direct solver.
-    pub fn stronger<const D: usize>(self, equations: usize) -> Option<Self> {
-        (self == Linear::Multigrid).then(|| Self::direct::<D>(equations))
+    /// What to try when a step could not be solved with this one, be it that a linear solve failed
+    /// (`linear_failure`) or Newton's method; `None` if there is nothing better.
+    pub fn stronger<const D: usize>(self, equations: usize, linear_failure: bool) -> Option<Self> {
+        match self {
+            Linear::Multigrid if !linear_failure => None,
+            Linear::Multigrid | Linear::Trial => Some(Self::direct::<D>(equations)),
+            Linear::Direct | Linear::DirectOnOne => None,
+        }
     }
 
     fn direct<const D: usize>(equations: usize) -> Self {
@@ -79,16 +120,20 @@ impl Linear {
                 ("snes_lag_preconditioner", "1"),
             ],
             // The first iterate's hierarchy serves the whole step, unless it has become slow.
-            Linear::Multigrid => &[
+            Linear::Multigrid | Linear::Trial => &[
                 ("ksp_type", "cg"),
                 ("ksp_rtol", "1e-8"),
-                ("ksp_max_it", "1000"),
                 ("pc_type", "mg"),
                 ("snes_lag_preconditioner", "1000"),
             ],
         };
         let mut options: Vec<_> =
             list.iter().map(|(name, value)| (*name, (*value).to_string())).collect();
+        match self {
+            Linear::Multigrid => options.push(("ksp_max_it", "1000".into())),
+            Linear::Trial => options.push(("ksp_max_it", TRIAL.to_string())),
+            Linear::Direct | Linear::DirectOnOne => {}
+        }
         if self.gathers(ranks) {
             options.push(("pc_telescope_reduction_factor", ranks.to_string()));
         }
@@ -106,7 +151,7 @@ pub fn newton(
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
     snes.set_defaults(&linear.options(world.size()))?;
-    if null_pivots && linear != Linear::Multigrid {
+    if null_pivots && matches!(linear, Linear::Direct | Linear::DirectOnOne) {
         let inner = if linear.gathers(world.size()) { "telescope_" } else { "" };
         snes.set_defaults(&[(&format!("{inner}mat_mumps_icntl_24"), "1")])?;
     }

@@ -11,3 +11,4 @@ mod equality;
 mod shear;
 mod snap;
 mod solid;
+mod solver;
