@@ -277,7 +277,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         if self.diagonal_scale == 0.0 {
             self.diagonal_scale = mean_diagonal(
                 self.world,
-                numbering,
+                numbering.owned,
                 self.pattern,
                 |dof| !self.held.holds(dof),
                 &mut rows,
@@ -371,7 +371,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
             let (mut main, mut other) = matrix.storage()?;
             let mut rows = InPlace::filled(&self.layout, &mut main, &mut self.beside)?;
             let scale = self.diagonal_scale;
-            self.held.constrain(self.numbering, self.pattern, scale, &mut rows);
+            self.held.constrain(self.pattern, scale, &mut rows);
             if let Some(other) = &mut other {
                 rows.hand_over(other)?;
             }
@@ -490,15 +490,15 @@ impl Inertia {
 /// Mean size of the free diagonal entries over all ranks; 1 where there are none. Collective.
 fn mean_diagonal<const D: usize, R: BlockRows<D>>(
     world: &World,
-    numbering: &Numbering,
+    owned: usize,
     pattern: &Pattern,
     free: impl Fn(usize) -> bool,
     rows: &mut R,
 ) -> f64 {
     let (mut sum, mut count) = (0.0, 0usize);
-    for row in 0..numbering.owned {
+    for row in 0..owned {
         let range = pattern.offsets[row]..pattern.offsets[row + 1];
-        let Some(position) = pattern.find(numbering, row, row) else { continue };
+        let Some(position) = pattern.diagonal(row) else { continue };
         let start = rows.start(pattern, row) + (position - range.start) * D;
         for i in (0..D).filter(|i| free(row * D + i)) {
             sum += rows.values(start + i * (range.len() * D + 1), 1)[0].abs();

@@ -98,7 +98,7 @@ impl GridMass {
             GridMass::Lumped(mass) => {
                 let mut matrix = BlockMatrix::zeros(pattern);
                 for row in 0..mesh.numbering.owned {
-                    if let Some(entry) = pattern.find(&mesh.numbering, row, row) {
+                    if let Some(entry) = pattern.diagonal(row) {
                         matrix.values[entry] = factor * mass[row];
                     }
                 }
@@ -218,7 +218,7 @@ pub fn require_mass<const D: usize>(
     let mass_of = |node: usize| match mass {
         GridMass::Lumped(mass) => mass[node],
         GridMass::Consistent { matrix, .. } => {
-            mesh.pattern.find(numbering, node, node).map_or(0.0, |entry| matrix.values[entry])
+            mesh.pattern.diagonal(node).map_or(0.0, |entry| matrix.values[entry])
         }
     };
     let bad = (0..numbering.owned).find(|&node| {

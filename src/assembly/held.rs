@@ -85,7 +85,6 @@ impl Held {
     /// Puts the identity times `scale` into the assembled rows and keeps what it overwrites.
     pub fn constrain<const D: usize, R: BlockRows<D>>(
         &mut self,
-        numbering: &Numbering,
         pattern: &Pattern,
         scale: f64,
         rows: &mut R,
@@ -100,7 +99,7 @@ impl Held {
                 self.saved_rows.extend_from_slice(values);
             }
             values.fill(0.0);
-            if let Some(entry) = pattern.find(numbering, row, row) {
+            if let Some(entry) = pattern.diagonal(row) {
                 values[(entry - pattern.offsets[row]) * D + i] = scale;
             }
         }

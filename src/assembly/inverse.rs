@@ -67,7 +67,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     ) -> Result<Self> {
         let rows = numbering.owned;
         let diagonal: Vec<f64> = (0..rows)
-            .map(|row| pattern.find(numbering, row, row).map_or(0.0, |entry| matrix.values[entry]))
+            .map(|row| pattern.diagonal(row).map_or(0.0, |entry| matrix.values[entry]))
             .collect();
         let free: Vec<bool> =
             (0..rows * D).map(|dof| !held[dof] && diagonal[dof / D] != 0.0).collect();

@@ -175,14 +175,11 @@ impl Pattern {
         Border::new(self.offsets.windows(2).take(owned).map(reaches))
     }
 
-    /// Position of column `local` in the row `row`, if the pair is in the pattern.
-    pub fn find(&self, numbering: &Numbering, row: usize, local: usize) -> Option<usize> {
+    /// Position of the diagonal of an owned row, if it is in the pattern.
+    pub fn diagonal(&self, row: usize) -> Option<usize> {
         let range = self.offsets[row]..self.offsets[row + 1];
-        let key = numbering.global[local];
-        self.columns[range.clone()]
-            .binary_search_by_key(&key, |&column| numbering.global[column as usize])
-            .ok()
-            .map(|position| range.start + position)
+        let own = |&column: &u32| column as usize == row;
+        self.columns[range.clone()].iter().position(own).map(|position| range.start + position)
     }
 
     /// Tells each owner, entry by entry, which of its entries the ghost rows add to.
