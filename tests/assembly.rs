@@ -12,7 +12,7 @@ use mpm_par::analysis::discretise::{Discretisation, Model};
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, ghost_matrix};
 use mpm_par::analysis::{setup, solver};
 use mpm_par::assembly::conditions::{Conditions, StepSpan};
-use mpm_par::assembly::internal::{self, StepPoints};
+use mpm_par::assembly::internal;
 use mpm_par::assembly::{BlockMatrix, plain, scatter};
 use mpm_par::deck;
 use mpm_par::deck::model::Frame;
@@ -94,13 +94,7 @@ fn compare<const D: usize>(
     let mesh = Discretisation::new(world, &model, &points)?;
     let numbering = &mesh.numbering;
     let displacement = field(&model, &mesh);
-    let step = StepPoints {
-        points: &points,
-        materials: &model.materials,
-        influences: &mesh.influences,
-        groups: &mesh.groups,
-        group_nodes: &mesh.group_nodes,
-    };
+    let step = mesh.step_points(&points, &model.materials);
     for frame in [Frame::Previous, Frame::Updated, Frame::Total] {
         let zeros = vec![0.0; numbering.len() * D];
         let (mut fast, mut slow) = (zeros.clone(), zeros);

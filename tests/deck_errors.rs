@@ -241,6 +241,7 @@ fn checks_of_the_analysis_and_the_method() {
             ),
             (&["method.velocity_update=flop"], "did you mean \"flip\"?"),
             (&["method.position_update=publisht"], "did you mean \"published\"?"),
+            (&["method.point_volume=domain", "method.basis=mpm"], "is for basis = \"gimp\""),
             (&["method.position_updates=published"], "did you mean \"position_update\"?"),
             (&["method.xpic_order=3"], "only with velocity_update = \"xpic\""),
             (&["ghost.stiffness_factor=1"], "stiffness is given too"),

@@ -74,6 +74,9 @@ fn options_change_the_deck() {
     let deck = read(BEAM, &["method.velocity_update=xpic", "method.xpic_order=5"]);
     assert_eq!((deck.method.xpic, deck.method.flip), (Some(5), 0.0));
     assert_eq!(deck.method.position_update, PositionUpdate::Momentum);
+    assert_eq!(deck.method.point_volume, PointVolume::Deformation);
+    let deck = read(BEAM, &["method.point_volume=domain"]);
+    assert_eq!(deck.method.point_volume, PointVolume::Domain);
     let deck = read(DYNAMIC, &["method.position_update=published"]);
     assert_eq!(deck.method.position_update, PositionUpdate::Published);
     let deck = read(BEAM, &["analysis.hht_alpha=-0.1"]);

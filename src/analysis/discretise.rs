@@ -8,7 +8,7 @@ use crate::assembly::numbering::Touched;
 use crate::assembly::{Numbering, Pattern, Populated, external, pattern};
 use crate::basis::{self, Groups, Influences};
 use crate::deck::Deck;
-use crate::deck::model::Basis;
+use crate::deck::model::{Basis, PointVolume};
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
@@ -75,6 +75,8 @@ pub struct Discretisation<const D: usize> {
     pub on_face: Vec<bool>,
     /// Cells of the faces owned here.
     pub ghost_cells: Vec<usize>,
+    /// What stresses are integrated over.
+    pub point_volume: PointVolume,
 }
 
 /// Whether the step's equations couple nodes.
@@ -209,6 +211,7 @@ impl<const D: usize> Discretisation<D> {
             node_grip,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
+            point_volume: model.deck.method.point_volume,
         })
     }
 
@@ -224,6 +227,7 @@ impl<const D: usize> Discretisation<D> {
             influences: &self.influences,
             groups: &self.groups,
             group_nodes: &self.group_nodes,
+            volume: self.point_volume,
         }
     }
 

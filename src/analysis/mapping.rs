@@ -205,7 +205,7 @@ mod tests {
 
     use super::*;
     use crate::basis::{self, Groups};
-    use crate::deck::model::Basis;
+    use crate::deck::model::{Basis, PointVolume};
     use crate::grid::{Grid, Lattice};
     use crate::points::Points;
 
@@ -238,6 +238,7 @@ mod tests {
                 influences: &influences,
                 groups: &groups,
                 group_nodes: &group_nodes,
+                volume: PointVolume::default(),
             };
             for external in [&external[..], &[]] {
                 let (mut momenta, mut forces) = (vec![[0.0; 2]; nodes], vec![[0.0; 2]; nodes]);

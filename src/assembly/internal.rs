@@ -2,7 +2,7 @@
 //! per group of points that share their nodes.
 
 use crate::basis::{Groups, Influences};
-use crate::deck::model::Frame;
+use crate::deck::model::{Frame, PointVolume};
 use crate::error::Result;
 use crate::material::Material;
 use crate::mechanics::{self, Contribution, StepStart};
@@ -23,6 +23,7 @@ pub struct StepPoints<'a, const D: usize> {
     pub groups: &'a Groups,
     /// Local node index of each entry of `groups.nodes`.
     pub group_nodes: &'a [u32],
+    pub volume: PointVolume,
 }
 
 impl<'a, const D: usize> StepPoints<'a, D> {
@@ -234,7 +235,10 @@ pub(super) fn respond<const D: usize>(
         material: &step.materials[points.body[p] as usize],
         deformation_gradient: &points.deformation_gradient[p],
         elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
-        volume_initial: points.volume_initial[p],
+        volume_initial: match step.volume {
+            PointVolume::Deformation => points.volume_initial[p],
+            PointVolume::Domain => domain_volume(points, p),
+        },
     };
     let (contribution, state) = mechanics::contribution(frame, &start, increment);
     if crate::tensor::dense::determinant(increment) <= 0.0 {
@@ -245,6 +249,14 @@ pub(super) fn respond<const D: usize>(
         return None;
     }
     Some(contribution)
+}
+
+/// The initial volume of which det F makes that of the domain at the step's start, m3.
+#[cold]
+fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
+    let (now, start) = (&points.half_length[p], &points.half_length_initial[p]);
+    let ratio: f64 = now.iter().zip(start).map(|(now, start)| now / start).product();
+    points.volume_initial[p] * ratio / points.deformation_gradient[p].determinant()
 }
 
 /// dF = 1 + Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7).

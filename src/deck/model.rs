@@ -80,6 +80,7 @@ pub enum InvertedIterates {
 pub struct Method {
     pub basis: Basis,
     pub domain_update: DomainUpdate,
+    pub point_volume: PointVolume,
     pub frame: Frame,
     pub mass: Mass,
     pub stress_update: StressUpdate,
@@ -111,6 +112,16 @@ pub enum DomainUpdate {
     Corners,
     NormalCorrected,
     NormalIncremental,
+}
+
+/// What stresses are integrated over: the two differ where a domain's size does not follow det F.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PointVolume {
+    /// det F V0
+    #[default]
+    Deformation,
+    /// That of the GIMP domain, as in the program behind Lagrangian §7.
+    Domain,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

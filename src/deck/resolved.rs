@@ -114,6 +114,7 @@ fn analysis(w: &mut Writer, deck: &Deck) {
     w.table("[method]");
     w.line("method", "basis", quote(m.basis.name()));
     w.line("method", "domain_update", quote(m.domain_update.name()));
+    w.line("method", "point_volume", quote(m.point_volume.name()));
     // What `control = "fem"` stands for is written out in grid.motion and body.gauss.
     w.line("method", "control", quote("off"));
     w.line("method", "frame", quote(m.frame.name()));

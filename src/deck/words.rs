@@ -2,7 +2,7 @@
 
 use super::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
-    InvertedIterates, Mass, OnFailure, PositionUpdate, StressUpdate, VerifyNorm,
+    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -48,6 +48,7 @@ words! {
         "normal-corrected" => NormalCorrected,
         "normal-incremental" => NormalIncremental,
     }
+    PointVolume { "deformation" => Deformation, "domain" => Domain }
     Frame { "previous" => Previous, "updated" => Updated, "total" => Total }
     Mass { "consistent" => Consistent, "lumped" => Lumped }
     StressUpdate { "usf" => Usf, "usl" => Usl, "musl" => Musl }

@@ -16,7 +16,7 @@ use mpm_par::analysis::discretise::{Discretisation, Model};
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
 use mpm_par::analysis::{setup, solver, update};
 use mpm_par::assembly::conditions::{Conditions, StepSpan};
-use mpm_par::assembly::internal::{self, StepPoints, deformation_increment};
+use mpm_par::assembly::internal::{self, deformation_increment};
 use mpm_par::assembly::{BlockMatrix, Numbering};
 use mpm_par::error::Result;
 use mpm_par::mechanics::{self, StepStart};
@@ -289,13 +289,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     )?;
     let numbering = &mesh.numbering;
     let displacement = field(&model, numbering);
-    let step = StepPoints {
-        points: &points,
-        materials: &model.materials,
-        influences: &mesh.influences,
-        groups: &mesh.groups,
-        group_nodes: &mesh.group_nodes,
-    };
+    let step = mesh.step_points(&points, &model.materials);
     let frame = model.deck.method.frame;
 
     let increments: Vec<[[f64; D]; D]> = (0..count)

@@ -158,6 +158,18 @@ pub fn assert_quadratic(residuals: &[f64], step: usize) {
     );
 }
 
+/// Lagrangian Figure 15 b: with `normal` domains, which turn and shrink, and their volumes the run
+/// fails beyond step 19.
+#[test]
+fn domains_that_shrink_as_they_turn_fail_beyond_step_19() {
+    let run = beam("beam-lagrangian", 0.5, 6)
+        .set("method.domain_update=\"normal\"")
+        .set("method.point_volume=\"domain\"");
+    let outcome = run.attempt();
+    assert_eq!(outcome.code, 1, "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("the last finished step is 19"), "{}", outcome.stderr);
+}
+
 /// Tip displacement over the length (down-ward and inward): mean over the last sections of
 /// points, carried on to the end face. The loaded points themselves sink in.
 fn tip(results: &Results, step: usize) -> [f64; 2] {

@@ -12,11 +12,12 @@ fn column(deck: &str, k: u32) -> Run {
         .set("output.every=1000")
 }
 
+fn gimp(update: &str, k: u32) -> Run {
+    column("column", k).set(format!("method.domain_update=\"{update}\""))
+}
+
 fn gimp_error(update: &str, k: u32) -> f64 {
-    column("column", k)
-        .set(format!("method.domain_update=\"{update}\""))
-        .results()
-        .verify("stress_error")
+    gimp(update, k).results().verify("stress_error")
 }
 
 fn mpm_error(per_cell: usize, k: u32) -> f64 {
@@ -59,6 +60,24 @@ fn domains_that_ignore_or_spread_the_compression_stop_converging() {
     assert!(none[2] > 0.98 * none[1] && none[1] > 0.98 * none[0], "{none:?}");
     assert!(det[2] > 0.98 * det[1], "{det:?}");
     assert!(det[2] > 10.0 * sound && none[2] > 1.5 * det[2], "{none:?} {det:?} {sound}");
+}
+
+/// Lagrangian Figure 7: with the volumes of the domains `none` fails to converge beyond the third
+/// analysis and `det` beyond the sixth, the first being that of 2^2 cells.
+#[test]
+fn domains_that_are_volumes_stop_converging_where_the_paper_says() {
+    for (update, last) in [("none", 4), ("det", 7)] {
+        let errors: Vec<f64> = (2..=9)
+            .map(|k| {
+                let run = gimp(update, k).set("method.point_volume=\"domain\"");
+                run.results().verify("stress_error")
+            })
+            .collect();
+        for (pair, k) in errors.windows(2).zip(3..) {
+            let rate = (pair[0] / pair[1]).log2();
+            assert_eq!(rate > 0.7, k <= last, "{update}, 2^{k} cells: rate {rate}, {errors:?}");
+        }
+    }
 }
 
 #[test]

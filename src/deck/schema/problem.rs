@@ -9,7 +9,7 @@ use super::{POSITIVE, Section, at_least, between, key};
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
-    InvertedIterates, Mass, OnFailure, PositionUpdate, StressUpdate, VerifyNorm,
+    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -81,6 +81,8 @@ pub const SECTIONS: &[Section] = &[
                 "fem: the same deck by updated-Lagrangian finite elements, as a control: Gauss points for points_per_cell, basis mpm, a mesh that follows the material."),
             key("domain_update", Choice(DomainUpdate::NAMES), Default("\"corners\""),
                 "How GIMP domains follow the deformation (Lagrangian eq. 32-39)."),
+            key("point_volume", Choice(PointVolume::NAMES), Default("\"deformation\""),
+                "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none)."),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
                 "State in which equilibrium is written (Lagrangian §3-5)."),
             key("mass", Choice(Mass::NAMES), Default("\"consistent\""), "Mass matrix (dynamics)."),

@@ -1,6 +1,6 @@
 //! `[analysis]`, `[method]`, `[ghost]`, `[conditioning]`.
 
-use crate::deck::model::{Analysis, AnalysisType, Basis, Ghost, Mass, Method};
+use crate::deck::model::{Analysis, AnalysisType, Basis, Ghost, Mass, Method, PointVolume};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::between;
@@ -101,6 +101,7 @@ pub fn method(
 ) -> Got<Method> {
     let basis: Got<Basis> = table.choice("basis");
     let domain_update = table.choice("domain_update");
+    let point_volume = table.choice("point_volume");
     let frame = table.choice("frame");
     let mass = table.choice("mass");
     let stress_update = table.choice("stress_update");
@@ -125,11 +126,20 @@ pub fn method(
         ));
     }
     let mass = if xpic { Mass::Lumped } else { mass };
+    let (basis, point_volume) = (basis?, point_volume?);
+    let quasi_static = kind.is_none_or(|kind| kind == AnalysisType::QuasiStatic);
+    if point_volume == PointVolume::Domain && !(basis == Basis::Gimp && quasi_static) {
+        return Err(table.problem(
+            "point_volume",
+            "\"domain\" is for basis = \"gimp\" in analysis.type = \"quasi-static\"",
+        ));
+    }
     // Explicit steps keep every node that has mass: dropping one would lose its momentum.
     let keeps_all = stiffened || kind == Some(AnalysisType::Explicit);
     Ok(Method {
-        basis: basis?,
+        basis,
         domain_update: domain_update?,
+        point_volume,
         frame: frame?,
         mass,
         stress_update: stress_update?,
