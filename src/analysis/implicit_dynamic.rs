@@ -52,7 +52,7 @@ pub fn run<const D: usize>(
     let mut framed = match recorder.resumed() {
         Some(state) => {
             stepping.restore(state)?;
-            trials.restore(state)?;
+            trials.restore(state);
             ledger.restore(state)?;
             ghost_energy = state.number("ghost_energy")?;
             None

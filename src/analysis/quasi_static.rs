@@ -40,7 +40,7 @@ pub fn run<const D: usize>(
     match recorder.resumed() {
         Some(state) => {
             stepping.restore(state)?;
-            trials.restore(state)?;
+            trials.restore(state);
             totals.restore(state)?;
         }
         None => recorder.frame(world, 0, 0.0, points)?,
