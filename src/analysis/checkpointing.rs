@@ -184,7 +184,7 @@ fn error_text(text: &str) -> String {
 pub fn advice(world: &World, out: &Path) -> String {
     let newest = listed(world, out).ok().and_then(|known| known.into_iter().next());
     let newest = newest.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());
-    let room = "make room (disk, quota or file-size limit)";
+    let room = "make room (disk, quota, file-size limit) or mend the disk";
     match newest {
         Some(name) => format!("{room}, then go on from {name} with --restart last"),
         None => format!(
