@@ -265,6 +265,29 @@ fn a_table_that_may_not_grow() {
     }
 }
 
+/// A step that fails, and then a state that cannot be kept: the first is what ended the run.
+#[test]
+fn a_failed_step_is_not_hidden_by_the_disk() {
+    let more = [
+        "--set",
+        "load.0={ body_force = [\"0\", \"if(x > 3.6 && s > 0.3, -1e9, -2e4)\"] }",
+        "--set",
+        "output.checkpoint={ every = 100 }",
+    ];
+    for ranks in [1, 2] {
+        let folder = tempfile::tempdir().unwrap();
+        let end = under_a_limit(folder.path(), ranks, "true", 160, &more);
+        assert_eq!(end.code, 1, "{}", end.said);
+        assert!(end.said.starts_with("error: step 3 of 8 could not be solved: "), "{}", end.said);
+        assert_eq!(end.said.matches("error:").count(), 1, "{}", end.said);
+        assert!(end.said.ends_with("results: disk/out, good up to step 2"), "{}", end.said);
+        let log = fs::read_to_string(end.out.join("log.txt")).unwrap();
+        let warning = format!("warning: cannot write disk/out/checkpoint-000002.h5: {TOO_LARGE}");
+        assert!(log.contains(&warning), "{log}");
+        assert_eq!(left::summary(&end.out)["status"], "stopped");
+    }
+}
+
 /// Whatever is being written as the disk becomes full.
 #[test]
 #[ignore = "a minute"]

@@ -215,11 +215,10 @@ impl Run<'_> {
                 (Ending::failed(error.to_string()), Error::File)
             }
             // What happened first is what the run is to say.
-            Err(error) => {
-                recorder.log.say(&format!("warning: {error}"));
+            written => {
+                recorder.warn_of_files(written)?;
                 (ending, kind)
             }
-            Ok(()) => (ending, kind),
         };
         recorder.log.say(&report::closing(&summary, &recorder.directory()));
         let unused = self.session.unused_options()?;

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::assembly::Numbering;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
 use crate::output::log::Log;
@@ -204,9 +204,22 @@ impl Recorder {
         state: RunState,
     ) -> Result<()> {
         if self.checkpointer.planned() {
-            self.checkpoint(world, model, points, state)?;
+            let written = self.checkpoint(world, model, points, state);
+            return self.warn_of_files(written);
         }
         Ok(())
+    }
+
+    /// In a run that ends for another reason: that some file could not be written is a second
+    /// word, and does not take the place of the first.
+    pub fn warn_of_files(&mut self, written: Result<()>) -> Result<()> {
+        match written {
+            Err(Error::File(text)) => {
+                self.log.say(&format!("warning: {text}"));
+                Ok(())
+            }
+            other => other,
+        }
     }
 
     fn checkpoint<const D: usize>(

@@ -28,8 +28,8 @@ use super::agreement::{all_agree, on_root};
 use super::whole_file::{Partial, cannot_write};
 use crate::error::{Error, Result};
 
-/// What network file systems cache as a unit, bytes. Rows start at multiples of it: what one
-/// machine keeps of the library's own bytes never holds another machine's rows.
+/// What network file systems cache as a unit, bytes. The library's own bytes get units of their
+/// own: what rank 0's machine keeps of them, and writes back, never holds another machine's rows.
 const PAGE: u64 = 4096;
 /// Where a dataset without rows lies.
 const NOWHERE: u64 = u64::MAX;
