@@ -19,7 +19,6 @@ use hdf5::H5Type;
 use hdf5::plist::dataset_create::{AllocTime, FillTime};
 use hdf5::types::TypeDescriptor;
 use hdf5_sys::h5a::H5Awrite;
-use hdf5_sys::h5d::H5Dget_offset;
 use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::{Communicator, SimpleCommunicator};
 use mpi::traits::Root;
@@ -28,9 +27,12 @@ use super::agreement::{all_agree, on_root};
 use super::whole_file::{Partial, cannot_write};
 use crate::error::{Error, Result};
 
-/// What network file systems cache as a unit, bytes. The library's own bytes get units of their
-/// own: what rank 0's machine keeps of them, and writes back, never holds another machine's rows.
+/// What network file systems cache as a unit, bytes.
 const PAGE: u64 = 4096;
+/// Room for the library's own bytes at the beginning of a file, so that they share no page with
+/// rows: what rank 0's machine keeps of it, and writes back whole, would hold another machine's.
+/// Checkpoints take most, about 10 kB; what is not used stays a hole.
+const OWN_PAGES: u64 = 4 * PAGE;
 /// Where a dataset without rows lies.
 const NOWHERE: u64 = u64::MAX;
 
@@ -57,7 +59,7 @@ impl<'c> FileWriter<'c> {
                 .with_fapl(|p| {
                     p.sec2()
                         .alignment(PAGE, PAGE)
-                        .meta_block_size(2 * PAGE)
+                        .meta_block_size(OWN_PAGES)
                         .small_data_block_size(PAGE)
                 })
                 .create(partial.path());
@@ -199,12 +201,11 @@ fn new_dataset<T: H5Type>(
         1 => builder.shape(rows).create(name),
         _ => builder.shape((rows, columns)).create(name),
     }?;
-    if rows == 0 {
-        return Ok(NOWHERE);
+    match dataset.offset() {
+        Some(start) => Ok(start),
+        None if rows == 0 => Ok(NOWHERE),
+        None => Err("HDF5 gave the dataset no place".into()),
     }
-    // SAFETY: the dataset is open.
-    let start = hdf5::sync::sync(|| unsafe { H5Dget_offset(dataset.id()) });
-    if start == NOWHERE { Err("HDF5 gave the dataset no place".into()) } else { Ok(start) }
 }
 
 /// A text of fixed length: one of variable length would lie elsewhere in the file.
