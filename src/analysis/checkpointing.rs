@@ -180,6 +180,20 @@ fn error_text(text: &str) -> String {
     format!("error: {text}\nnothing was changed")
 }
 
+/// What helps when results could not be written. Collective.
+pub fn advice(world: &World, out: &Path) -> String {
+    let newest = listed(world, out).ok().and_then(|known| known.into_iter().next());
+    let newest = newest.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());
+    let room = "make room (disk, quota, file-size limit) or mend the disk";
+    match newest {
+        Some(name) => format!("{room}, then go on from {name} with --restart last"),
+        None => format!(
+            "{room}, then start again with --force; output.checkpoint = {{ every = 10 }} lets a run \
+             go on where it ended"
+        ),
+    }
+}
+
 /// True if the checkpoint lies in the results directory, which is then continued. Collective.
 pub fn lies_in(world: &World, checkpoint: &Path, out: &Path) -> bool {
     let same = || {

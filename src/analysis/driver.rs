@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
+use std::io::Write as _;
 
 use mpi::environment::Universe;
 use mpi::traits::*;
@@ -13,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::output::ResultsDirectory;
 use crate::output::log::Log;
 use crate::output::report::{self, Banner, Failure};
+use crate::output::start;
 use crate::output::summary::Status;
 use crate::parallel::{World, signals};
 use crate::petsc::known;
@@ -29,6 +31,7 @@ use super::{plan, process, setup, support};
 /// exit code, the same on all ranks.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
     process::before_start();
+    start::before_mpi();
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();
@@ -48,7 +51,8 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
         Ok(()) => 0,
         Err(error) => {
             if world.is_root() {
-                eprintln!("error: {}", error.to_string().trim_end());
+                // The disk that is full may be the one where this goes, too.
+                let _ = writeln!(std::io::stderr(), "error: {}", error.to_string().trim_end());
             }
             error.exit_code()
         }
@@ -189,9 +193,14 @@ impl Run<'_> {
         let (ending, kind): (_, fn(String) -> Error) = match outcome {
             Ok(ending) => (ending, Error::Run),
             Err(error) => {
-                let kind = if error.exit_code() == 3 { Error::File } else { Error::Run };
+                let of_files = error.exit_code() == 3;
+                let kind = if of_files { Error::File } else { Error::Run };
+                if of_files {
+                    recorder.leave_unrecorded();
+                }
                 let (text, step) = (error.to_string(), recorder.steps_completed + 1);
-                let named = text.starts_with("step ");
+                // A file has its step in its name.
+                let named = of_files || text.starts_with("step ");
                 let text = if named { text } else { format!("step {step}: {text}") };
                 (Ending::failed(text), kind)
             }
@@ -199,8 +208,18 @@ impl Run<'_> {
         let figures = quasi_static::figures(world, &model, &points, &recorder)?;
         let (traffic, steps) = (clock.traffic(), recorder.steps_here());
         let sent = balance::communication(world, &model, traffic, steps);
-        let summary =
-            recorder.finish(world, &model.deck, &points, &clock, sent, figures, &ending)?;
+        let (summary, written) =
+            recorder.finish(world, &model.deck, &points, &clock, sent, figures, &ending);
+        let (ending, kind): (_, fn(String) -> Error) = match written {
+            Err(error) if ending.status == Status::Completed => {
+                (Ending::failed(error.to_string()), Error::File)
+            }
+            // What happened first is what the run is to say.
+            written => {
+                recorder.warn_of_files(written)?;
+                (ending, kind)
+            }
+        };
         recorder.log.say(&report::closing(&summary, &recorder.directory()));
         let unused = self.session.unused_options()?;
         if !unused.is_empty() {
@@ -216,10 +235,10 @@ impl Run<'_> {
             last_good_step: Some(recorder.steps_completed),
             results: Some(recorder.directory()),
             // Whoever sent a signal needs no advice, and no numerics heals a full disk.
-            advice: if ending.on_request || kind(String::new()).exit_code() == 3 {
-                Vec::new()
-            } else {
-                advice(&model.deck)
+            advice: match kind(String::new()).exit_code() {
+                _ if ending.on_request => Vec::new(),
+                3 => vec![checkpointing::advice(world, &recorder.directory())],
+                _ => advice(&model.deck),
             },
             ..Failure::default()
         };

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use crate::assembly::Numbering;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
 use crate::output::log::Log;
@@ -39,6 +39,8 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
+    /// The last step with a row in the history.
+    recorded: usize,
     /// Those of them before a restart.
     earlier_steps: usize,
     /// Load factor and time (s) reached so far.
@@ -138,6 +140,7 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
+            recorded: 0,
             earlier_steps: 0,
             reached: (0.0, 0.0),
             versions,
@@ -201,9 +204,22 @@ impl Recorder {
         state: RunState,
     ) -> Result<()> {
         if self.checkpointer.planned() {
-            self.checkpoint(world, model, points, state)?;
+            let written = self.checkpoint(world, model, points, state);
+            return self.warn_of_files(written);
         }
         Ok(())
+    }
+
+    /// In a run that ends for another reason: that some file could not be written is a second
+    /// word, and does not take the place of the first.
+    pub fn warn_of_files(&mut self, written: Result<()>) -> Result<()> {
+        match written {
+            Err(Error::File(text)) => {
+                self.log.say(&format!("warning: {text}"));
+                Ok(())
+            }
+            other => other,
+        }
     }
 
     fn checkpoint<const D: usize>(
@@ -243,6 +259,7 @@ impl Recorder {
         let count = |name: &str| state.count(name).map(|n| n as usize);
         self.steps_completed = count("recorder.steps")?;
         self.earlier_steps = self.steps_completed;
+        self.recorded = self.steps_completed;
         self.newton =
             Count { total: count("recorder.newton_total")?, max: count("recorder.newton_max")? };
         self.linear =
@@ -264,6 +281,7 @@ impl Recorder {
         self.seconds = self.earlier_seconds + row.wall_seconds;
         let whole_run = HistoryRow { wall_seconds: self.seconds, ..row.clone() };
         self.history.push(&whole_run, world.comm())?;
+        self.recorded = row.step;
         self.reached = (row.load_factor, row.time);
         self.populated_cells = row.populated_cells;
         self.imbalance = row.imbalance;
@@ -283,6 +301,11 @@ impl Recorder {
         };
         self.progress.step(&mut self.log, &report);
         Ok(())
+    }
+
+    /// A step that could be solved but not written is not a completed one.
+    pub fn leave_unrecorded(&mut self) {
+        self.steps_completed = self.steps_completed.min(self.recorded);
     }
 
     /// Residuals of a step's evaluations.
@@ -371,7 +394,7 @@ impl Recorder {
         self.steps_completed - self.earlier_steps
     }
 
-    /// Writes the summary and returns it. Collective.
+    /// The summary, and whether it could be written. Collective.
     #[allow(clippy::too_many_arguments)]
     pub fn finish<const D: usize>(
         &mut self,
@@ -382,7 +405,7 @@ impl Recorder {
         communication: Communication,
         verify: BTreeMap<String, f64>,
         ending: &Ending,
-    ) -> Result<Summary> {
+    ) -> (Summary, Result<()>) {
         let bodies = body_summaries(points, deck.bodies.len(), deck.method.basis, world.comm());
         let summary = Summary {
             title: deck.title.clone(),
@@ -404,7 +427,7 @@ impl Recorder {
             bodies: deck.bodies.iter().map(|body| body.name.clone()).zip(bodies).collect(),
             versions: self.versions.clone(),
         };
-        summary.write(&self.directory, world.comm())?;
-        Ok(summary)
+        let written = summary.write(&self.directory, world.comm());
+        (summary, written)
     }
 }

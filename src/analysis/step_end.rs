@@ -98,7 +98,8 @@ pub fn leave<const D: usize>(
     state: RunState,
 ) -> Result<()> {
     if framed != Some(completed) {
-        recorder.frame(world, completed, label, points)?;
+        let written = recorder.frame(world, completed, label, points);
+        recorder.warn_of_files(written)?;
     }
     recorder.keep_last_state(world, model, points, state)
 }

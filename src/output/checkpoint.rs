@@ -15,14 +15,13 @@
 
 use std::path::{Path, PathBuf};
 
-use hdf5::H5Type;
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::agreement::{all_agree, on_root};
-use super::hdf5_file::ParallelFile;
+use super::hdf5_reader::FileReader;
+use super::hdf5_writer::{FileWriter, Plain};
 use super::run_state::RunState;
 use super::seal::{self, Checksum, Flaw, checksum_of, wrapping_sum};
-use super::whole_file::cannot_write;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::Points;
@@ -63,7 +62,7 @@ impl<const D: usize> Checkpoint<'_, D> {
     /// Writes the file under another name, seals it, brings it to the disk and renames it.
     /// Collective.
     pub fn write(&self, path: &Path, comm: &SimpleCommunicator) -> Result<()> {
-        let file = ParallelFile::create(path, comm)?;
+        let file = FileWriter::create(path, comm)?;
         file.write_number("step", &(self.step as u64))?;
         file.write_number("ranks", &(comm.size() as u64))?;
         file.write_number("dimension", &(D as u64))?;
@@ -104,7 +103,7 @@ impl<const D: usize> Checkpoint<'_, D> {
         let partial = file.close_unnamed()?;
         seal::seal(&partial, FORMAT, comm)?;
         on_root(comm, || {
-            std::fs::rename(&partial, path).map_err(|reason| cannot_write(path, &reason))?;
+            partial.give_name()?;
             // The name itself must reach the disk too; not every file system can be told so.
             if let Some(folder) = path.parent().and_then(|folder| std::fs::File::open(folder).ok())
             {
@@ -125,7 +124,7 @@ pub fn read<const D: usize>(
     if let Err(flaw) = seal::test(path, FORMAT, comm)? {
         return Ok(Err(flaw.into()));
     }
-    let input = Reader { file: ParallelFile::open(path, comm)?, comm, sums: Vec::new() };
+    let input = Reader { file: FileReader::open(path, comm)?, comm, sums: Vec::new() };
     let sums = input.file.read_all::<u64>("sums")?;
     let input = Reader { sums: sums.chunks_exact(2).map(|s| (s[0], s[1])).collect(), ..input };
     let own = input.text("text.physics")?;
@@ -210,7 +209,7 @@ fn content<const D: usize>(input: &Reader<'_>, path: &Path) -> Result<Restored<D
 
 /// Writes datasets and remembers their checksums.
 struct Writer<'c> {
-    file: ParallelFile<'c>,
+    file: FileWriter<'c>,
     comm: &'c SimpleCommunicator,
     /// (checksum of the name, checksum of the rows)
     sums: Vec<(u64, u64)>,
@@ -237,7 +236,7 @@ impl Writer<'_> {
 
 /// Reads datasets and compares their checksums.
 struct Reader<'c> {
-    file: ParallelFile<'c>,
+    file: FileReader<'c>,
     comm: &'c SimpleCommunicator,
     sums: Vec<(u64, u64)>,
 }
@@ -339,7 +338,7 @@ fn rows_sum<T: Word>(first: usize, columns: usize, values: &[T]) -> u64 {
 }
 
 /// What a checkpoint is made of.
-trait Word: H5Type + Clone + Default {
+trait Word: Plain + Clone + Default {
     fn word(&self) -> u64;
 }
 

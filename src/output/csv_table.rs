@@ -79,11 +79,19 @@ impl CsvTable {
         self.rows += rows.len();
         on_root(comm, || match &mut self.file {
             Some(file) => {
-                file.write_all(text.as_bytes()).map_err(|reason| cannot_write(&self.path, &reason))
+                append(file, text.as_bytes()).map_err(|reason| cannot_write(&self.path, &reason))
             }
             None => Ok(()),
         })
     }
+}
+
+/// Appends everything or nothing: a full disk takes the beginning of a row.
+fn append(file: &mut File, bytes: &[u8]) -> std::io::Result<()> {
+    let length = file.metadata()?.len();
+    file.write_all(bytes).inspect_err(|_| {
+        let _ = file.set_len(length);
+    })
 }
 
 /// Shortest text that reads back as the same number; whole numbers without a point.

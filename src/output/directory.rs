@@ -138,6 +138,7 @@ fn is_ours(name: &str) -> bool {
 fn probe(path: &Path) -> Result<()> {
     let file = path.join(".writable.partial");
     fs::write(&file, b"x").map_err(|reason| {
+        let _ = fs::remove_file(&file);
         Error::File(format!("cannot write in the results directory {}: {reason}", path.display()))
     })?;
     fs::remove_file(&file).map_err(|reason| cannot_write(&file, &reason))

@@ -3,7 +3,7 @@
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::directory::ResultsDirectory;
-use super::hdf5_file::ParallelFile;
+use super::hdf5_writer::FileWriter;
 use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfSeries};
 use crate::deck::model::Element;
 use crate::error::Result;
@@ -82,7 +82,7 @@ impl GridSeries {
         assert_eq!(frame.ghost_boundary.len(), cells, "one flag per cell");
 
         let name = format!("grid-{step:06}.h5");
-        let file = ParallelFile::create(&self.directory.file(&name), comm)?;
+        let file = FileWriter::create(&self.directory.file(&name), comm)?;
         file.write_number("step", &(step as u64))?;
         file.write_number("time", &time)?;
         let item = |number, rows, columns, dataset: &str| DataItem {

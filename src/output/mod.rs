@@ -14,7 +14,8 @@
 //! | idea | file |
 //! |---|---|
 //! | the names and formulas of the point fields | `point_field.rs` |
-//! | collective HDF5 reads and writes | `hdf5_file.rs` |
+//! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
+//! | what writing asks of the process before MPI starts | `start.rs` |
 //! | XDMF time series | `xdmf.rs` |
 //! | text of the banner, the plan, the steps, the closing table, a failure | `report.rs`, `progress.rs` |
 //! | one rank acts, every rank learns the outcome | `agreement.rs` |
@@ -31,7 +32,8 @@ pub mod directory;
 pub mod domains;
 pub mod extent;
 pub mod grid_file;
-pub mod hdf5_file;
+pub mod hdf5_reader;
+pub mod hdf5_writer;
 pub mod history;
 pub mod log;
 pub mod point_field;
@@ -41,6 +43,7 @@ pub mod report;
 pub mod residuals;
 pub mod run_state;
 pub mod seal;
+pub mod start;
 pub mod summary;
 pub mod whole_file;
 pub mod xdmf;
@@ -50,7 +53,8 @@ mod tests;
 
 pub use directory::ResultsDirectory;
 pub use grid_file::{GridFrame, GridSeries};
-pub use hdf5_file::ParallelFile;
+pub use hdf5_reader::FileReader;
+pub use hdf5_writer::FileWriter;
 pub use history::{Column, History};
 pub use log::Log;
 pub use point_field::{PointField, Quantity};

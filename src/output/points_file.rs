@@ -5,7 +5,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::directory::ResultsDirectory;
 use super::domains;
-use super::hdf5_file::ParallelFile;
+use super::hdf5_writer::FileWriter;
 use super::point_field::{PointField, Quantity, append_vector};
 use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfSeries};
 use crate::deck::model::Basis;
@@ -68,7 +68,7 @@ impl PointsSeries {
         comm: &SimpleCommunicator,
     ) -> Result<()> {
         let name = format!("points-{step:06}.h5");
-        let file = ParallelFile::create(&self.directory.file(&name), comm)?;
+        let file = FileWriter::create(&self.directory.file(&name), comm)?;
         file.write_number("step", &(step as u64))?;
         file.write_number("time", &time)?;
 
@@ -144,7 +144,7 @@ fn with_always(fields: &[PointField]) -> Vec<PointField> {
 }
 
 fn write_field<const D: usize>(
-    file: &ParallelFile,
+    file: &FileWriter,
     field: PointField,
     points: &Points<D>,
     rank: i32,
@@ -166,7 +166,7 @@ fn write_field<const D: usize>(
 
 /// Writes the numbers 0, 1, 2, ... over all ranks, `columns` to a row. Readers disagree about
 /// point clouds and polygons without connectivity, so it is spelled out.
-fn numbers(file: &ParallelFile, name: &str, columns: usize, rows: usize) -> Result<usize> {
+fn numbers(file: &FileWriter, name: &str, columns: usize, rows: usize) -> Result<usize> {
     let first = file.first_row(rows) * columns;
     let values: Vec<i64> = (first..first + rows * columns).map(|number| number as i64).collect();
     file.write_rows(name, columns, &values)

@@ -11,7 +11,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 use mpi::traits::Root;
 
 use super::agreement::{all_agree, on_root};
-use super::whole_file::{cannot_read, cannot_write};
+use super::whole_file::{Partial, cannot_read, cannot_write};
 use crate::error::Result;
 
 const MAGIC: &[u8; 16] = b"mpm-par-restart\n";
@@ -80,7 +80,8 @@ pub fn wrapping_sum(comm: &SimpleCommunicator, own: u64) -> u64 {
 
 /// Seals the finished file with a format number and brings it to the disk. Collective: the
 /// ranks read the file back block by block.
-pub fn seal(path: &Path, format: u64, comm: &SimpleCommunicator) -> Result<()> {
+pub fn seal(partial: &Partial, format: u64, comm: &SimpleCommunicator) -> Result<()> {
+    let path = partial.path();
     let mut length = 0;
     on_root(comm, || {
         length = std::fs::metadata(path).map_err(|reason| cannot_read(path, &reason))?.len();
@@ -94,7 +95,7 @@ pub fn seal(path: &Path, format: u64, comm: &SimpleCommunicator) -> Result<()> {
             file.write_all(&seal_bytes(format, length, checksum))?;
             file.sync_all()
         };
-        write().map_err(|reason| cannot_write(path, &reason))
+        write().map_err(|reason| cannot_write(partial.name(), &reason))
     })
 }
 

@@ -266,7 +266,7 @@ fn hdf5_round_trip(folder: &Path, comm: &SimpleCommunicator) {
     let rank = comm.rank() as u64;
     // Rank 0 holds nothing, to have the first rows come from another rank.
     let values: Vec<u64> = (0..2 * rank).map(|k| u64::MAX - (100 * rank + k)).collect();
-    let file = ParallelFile::create(&path, comm).unwrap();
+    let file = FileWriter::create(&path, comm).unwrap();
     let total = file.write_rows("pairs", 2, &values).unwrap();
     assert_eq!(total as i32, comm.size() * (comm.size() - 1) / 2);
     file.write_rows::<f64>("nothing", 3, &[]).unwrap();
@@ -280,7 +280,7 @@ fn hdf5_round_trip(folder: &Path, comm: &SimpleCommunicator) {
     .unwrap();
     file.finish().unwrap();
 
-    let file = ParallelFile::open(&path, comm).unwrap();
+    let file = FileReader::open(&path, comm).unwrap();
     assert_eq!(file.shape("pairs").unwrap(), (total, 2));
     assert_eq!(file.shape("nothing").unwrap(), (0, 3));
     assert_eq!(file.read_number::<u32>("version").unwrap(), 3);
@@ -329,10 +329,10 @@ fn errors_reach_every_rank(folder: &Path, comm: &SimpleCommunicator) {
     };
     file_error(ResultsDirectory::create(&taken, true, comm).unwrap_err(), "taken");
     file_error(ResultsDirectory::reopen(&folder.join("absent"), comm).unwrap_err(), "absent");
-    file_error(ParallelFile::open(&taken, comm).err().unwrap(), "not a readable HDF5 file");
-    file_error(ParallelFile::open(&folder.join("absent.h5"), comm).err().unwrap(), "No such file");
+    file_error(FileReader::open(&taken, comm).err().unwrap(), "not a readable HDF5 file");
+    file_error(FileReader::open(&folder.join("absent.h5"), comm).err().unwrap(), "No such file");
     let path = folder.join("absent").join("points.h5");
-    file_error(ParallelFile::create(&path, comm).err().unwrap(), "No such file");
+    file_error(FileWriter::create(&path, comm).err().unwrap(), "No such file");
 
     let directory = ResultsDirectory::create(&folder.join("out"), false, comm).unwrap();
     Summary::default().write(&directory, comm).unwrap();

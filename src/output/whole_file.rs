@@ -1,9 +1,11 @@
 //! Files that are whole or absent: written under another name, then renamed.
 
 use std::ffi::OsString;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+
+use mpi::topology::{Communicator, SimpleCommunicator};
 
 use crate::error::{Error, Result};
 
@@ -31,6 +33,49 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
         let _ = fs::remove_file(&partial);
         cannot_write(path, &reason)
     })
+}
+
+/// A file of all ranks that does not have its name yet. Rank 0 answers for it: it gives the name,
+/// or removes the file when this is dropped before.
+#[derive(Debug, Default)]
+pub struct Partial {
+    name: PathBuf,
+    path: PathBuf,
+    answers: bool,
+}
+
+impl Partial {
+    /// Of the file that is to have this name.
+    pub fn of(name: &Path, comm: &SimpleCommunicator) -> Self {
+        Self { name: name.to_path_buf(), path: partial_path(name), answers: comm.rank() == 0 }
+    }
+
+    /// The name it is to have.
+    pub fn name(&self) -> &Path {
+        &self.name
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// For rank 0: the file is whole.
+    pub fn give_name(mut self) -> Result<()> {
+        fs::rename(&self.path, &self.name).map_err(|reason| cannot_write(&self.name, &reason))?;
+        self.answers = false;
+        Ok(())
+    }
+}
+
+impl Drop for Partial {
+    fn drop(&mut self) {
+        if self.answers {
+            // Who has it open still holds its space, which the summary of the failure needs.
+            let _ = OpenOptions::new().write(true).truncate(true).open(&self.path);
+            let _ = fs::remove_file(&self.path);
+        }
+    }
 }
 
 pub fn cannot_write(path: &Path, reason: &std::io::Error) -> Error {

@@ -1,8 +1,6 @@
-//! Collective HDF5: the thin safe wall around parallel files.
+//! Collective HDF5: the thin safe wall around files that all ranks read together.
 //!
-//! A dataset is a table of rows dealt out over the ranks: rank r holds the rows after those of
-//! ranks 0..r. Ranks without rows take part in every call. A file gets its name only when it is
-//! whole, so that a killed run leaves no damaged file under a good name.
+//! A dataset is a table of rows; every rank takes the rows it wants in calls that all ranks make.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -11,8 +9,8 @@ use std::ptr::null;
 use hdf5::H5Type;
 use hdf5::types::TypeDescriptor;
 use hdf5_sys::h5::hsize_t;
-use hdf5_sys::h5a::{H5Aread, H5Awrite};
-use hdf5_sys::h5d::{H5Dread, H5Dwrite};
+use hdf5_sys::h5a::H5Aread;
+use hdf5_sys::h5d::H5Dread;
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5p::{
     H5FD_mpio_xfer_t, H5P_CLS_DATASET_XFER, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio,
@@ -20,38 +18,21 @@ use hdf5_sys::h5p::{
 use hdf5_sys::h5s::{
     H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none,
 };
-use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::{Communicator, SimpleCommunicator};
 use mpi::traits::AsRaw;
 
 use super::agreement::{all_agree, on_root};
-use super::whole_file::{cannot_read, cannot_write, partial_path};
+use super::whole_file::cannot_read;
 use crate::error::{Error, Result};
 
-/// A file that all ranks of `comm` write or read together; drop it before MPI is finalised.
-pub struct ParallelFile<'c> {
+/// A file that all ranks of `comm` read together; drop it before MPI is finalised.
+pub struct FileReader<'c> {
     file: hdf5::File,
     path: PathBuf,
     comm: &'c SimpleCommunicator,
 }
 
-impl<'c> ParallelFile<'c> {
-    /// Starts a new file; it appears under `path` only after [`ParallelFile::finish`].
-    pub fn create(path: &Path, comm: &'c SimpleCommunicator) -> Result<Self> {
-        let partial = partial_path(path);
-        // The operating system's reason is only to be had from an ordinary open.
-        on_root(comm, || {
-            fs::File::create(&partial).map(drop).map_err(|reason| cannot_write(path, &reason))
-        })?;
-        let file = hdf5::File::with_options()
-            .with_fapl(|p| {
-                p.mpio(comm.as_raw(), None).all_coll_metadata_ops(true).coll_metadata_write(true)
-            })
-            .create(&partial);
-        let this = |file| Self { file, path: path.to_path_buf(), comm };
-        accept(comm, file, |reason| write_failed(path, "", reason)).map(this)
-    }
-
+impl<'c> FileReader<'c> {
     /// Opens an existing file for reading.
     pub fn open(path: &Path, comm: &'c SimpleCommunicator) -> Result<Self> {
         on_root(comm, || {
@@ -65,35 +46,6 @@ impl<'c> ParallelFile<'c> {
             Error::File(format!("{} is not a readable HDF5 file: {reason}", path.display()))
         })
         .map(this)
-    }
-
-    /// Writes a table of `columns` columns (a plain vector for one column): `values` are this
-    /// rank's rows, row by row. Returns the number of rows of all ranks.
-    pub fn write_rows<T: H5Type>(&self, name: &str, columns: usize, values: &[T]) -> Result<usize> {
-        assert!(
-            columns > 0 && values.len().is_multiple_of(columns),
-            "{name}: rows of unequal length"
-        );
-        let rows = values.len() / columns;
-        let (first, total) = self.place(rows);
-        let builder = self.file.new_dataset::<T>();
-        let dataset = match columns {
-            1 => builder.shape(total).create(name),
-            _ => builder.shape((total, columns)).create(name),
-        };
-        let failed = |reason: &hdf5::Error| write_failed(&self.path, name, reason);
-        let dataset = accept(self.comm, dataset, failed)?;
-        let outcome = hdf5::Datatype::from_type::<T>().and_then(|kind| {
-            let slab = Slab { first, rows, columns, flat: dataset.ndim() == 1 };
-            let values = values.as_ptr().cast();
-            slab.transfer(&dataset, |memory, file, transfer| {
-                // SAFETY: the dataset, both dataspaces and the property list are open; `values`
-                // holds the rows * columns elements of type T that the memory space selects.
-                unsafe { H5Dwrite(dataset.id(), kind.id(), memory, file, transfer, values) }
-            })
-        });
-        accept(self.comm, outcome, failed)?;
-        Ok(total)
     }
 
     /// Rows and columns of a table.
@@ -137,7 +89,7 @@ impl<'c> ParallelFile<'c> {
             let slab = Slab { first, rows, columns, flat: dataset.ndim() == 1 };
             let values = values.as_mut_ptr().cast();
             slab.transfer(&dataset, |memory, file, transfer| {
-                // SAFETY: as for writing; `values` has room for the rows * columns elements of
+                // SAFETY: the dataset, both dataspaces and the property list are open; `values` has room for the rows * columns elements of
                 // type T that the memory space selects, and HDF5 converts to T or fails.
                 unsafe { H5Dread(dataset.id(), kind.id(), memory, file, transfer, values) }
             })
@@ -160,26 +112,10 @@ impl<'c> ParallelFile<'c> {
         self.read_rows(name, first, end - first)
     }
 
-    /// Attaches a number to the file; the same value on every rank.
-    pub fn write_number<T: H5Type>(&self, name: &str, value: &T) -> Result<()> {
-        let outcome = self
-            .file
-            .new_attr::<T>()
-            .create(name)
-            .and_then(|attribute| attribute.as_writer().write_scalar(value));
-        accept(self.comm, outcome, |reason| write_failed(&self.path, name, reason))
-    }
-
     pub fn read_number<T: H5Type>(&self, name: &str) -> Result<T> {
         let outcome =
             self.file.attr(name).and_then(|attribute| attribute.as_reader().read_scalar());
         accept(self.comm, outcome, |reason| read_failed(&self.path, name, reason))
-    }
-
-    /// Attaches a text of less than 64 kB to the file; the same on every rank.
-    pub fn write_text(&self, name: &str, text: &str) -> Result<()> {
-        let outcome = write_text_attribute(&self.file, name, text);
-        accept(self.comm, outcome, |reason| write_failed(&self.path, name, reason))
     }
 
     pub fn read_text(&self, name: &str) -> Result<String> {
@@ -187,46 +123,13 @@ impl<'c> ParallelFile<'c> {
         accept(self.comm, outcome, |reason| read_failed(&self.path, name, reason))
     }
 
-    /// The row of the whole table at which this rank's `rows` rows start.
-    pub fn first_row(&self, rows: usize) -> usize {
-        self.place(rows).0
-    }
-
     pub fn has(&self, name: &str) -> bool {
         self.file.link_exists(name)
-    }
-
-    /// Closes the file and gives it its name.
-    pub fn finish(self) -> Result<()> {
-        let (path, comm) = (self.path.clone(), self.comm);
-        let partial = self.close_unnamed()?;
-        on_root(comm, || fs::rename(partial, &path).map_err(|reason| cannot_write(&path, &reason)))
-    }
-
-    /// Closes the file and leaves it under the name it has until it is whole, which is returned.
-    pub fn close_unnamed(self) -> Result<PathBuf> {
-        let Self { file, path, comm } = self;
-        let outcome = file.flush().and_then(|()| file.close());
-        accept(comm, outcome, |reason| write_failed(&path, "", reason))?;
-        Ok(partial_path(&path))
     }
 
     fn dataset(&self, name: &str) -> Result<hdf5::Dataset> {
         let dataset = self.file.dataset(name);
         accept(self.comm, dataset, |reason| read_failed(&self.path, name, reason))
-    }
-
-    /// This rank's first row, and the number of rows of all ranks.
-    fn place(&self, rows: usize) -> (usize, usize) {
-        let (mut before, mut total) = (0_u64, 0_u64);
-        let rows = rows as u64;
-        self.comm.exclusive_scan_into(&rows, &mut before, SystemOperation::sum());
-        // MPI leaves the result of rank 0 undefined.
-        if self.comm.rank() == 0 {
-            before = 0;
-        }
-        self.comm.all_reduce_into(&rows, &mut total, SystemOperation::sum());
-        (before as usize, total as usize)
     }
 }
 
@@ -296,21 +199,6 @@ impl Drop for Owned {
     }
 }
 
-/// A text of fixed length: texts of variable length cannot be written by several ranks.
-fn write_text_attribute(file: &hdf5::File, name: &str, text: &str) -> hdf5::Result<()> {
-    // HDF5 knows no empty fixed-length text; padding is cut off on reading.
-    let mut bytes = text.as_bytes().to_vec();
-    bytes.resize(bytes.len().max(1), 0);
-    let kind = TypeDescriptor::FixedUnicode(bytes.len());
-    let attribute = file.new_attr_builder().empty_as(kind).shape(()).create(name)?;
-    let kind = attribute.dtype()?;
-    hdf5::sync::sync(|| {
-        // SAFETY: both identifiers are open and the type is as long as `bytes`.
-        hdf5::h5check(unsafe { H5Awrite(attribute.id(), kind.id(), bytes.as_ptr().cast()) })
-    })?;
-    Ok(())
-}
-
 fn read_text_attribute(attribute: &hdf5::Attribute) -> hdf5::Result<String> {
     let kind = attribute.dtype()?;
     if !matches!(kind.to_descriptor()?, TypeDescriptor::FixedUnicode(_)) || !attribute.is_scalar() {
@@ -339,11 +227,6 @@ fn accept<T>(
     };
     all_agree(comm, mine)?;
     Ok(value.expect("all ranks agreed that there is a value"))
-}
-
-fn write_failed(path: &Path, name: &str, reason: &hdf5::Error) -> Error {
-    let space = if name.is_empty() { "" } else { " in " };
-    Error::File(format!("cannot write {name}{space}{}: {reason}", path.display()))
 }
 
 fn read_failed(path: &Path, name: &str, reason: &hdf5::Error) -> Error {
