@@ -15,11 +15,9 @@ use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
 
-/// Equations up to which the direct solver is the default in 2D and 3D, with Ghost stiffness:
-/// multigrid is faster from about a thousand on, but small studies like their residuals exact.
-const DIRECT_STABILISED: [usize; 2] = [10_000, 3_000];
-/// Without Ghost stiffness: from here on a factorisation costs about what a failed trial does.
-const DIRECT_UNSTABILISED: [usize; 2] = [20_000, 5_000];
+/// Equations up to which the direct solver is the default in 2D and 3D: multigrid is faster from
+/// about a thousand on, but small studies like their residuals exact.
+const DIRECT: [usize; 2] = [10_000, 3_000];
 /// Iterations of a trial per solve; where multigrid converges without Ghost, it takes 10 to 70.
 const TRIAL: usize = 100;
 /// Steps after a failed trial that start with the direct solver.
@@ -70,11 +68,13 @@ impl Linear {
     /// The default for a system of `equations` in `D` dimensions; `stabilised`: every body has
     /// Ghost stiffness.
     pub fn of<const D: usize>(equations: usize, stabilised: bool, trials: &Trials) -> Self {
-        let at = usize::from(D == 3);
+        if equations <= DIRECT[usize::from(D == 3)] {
+            return Self::direct::<D>(equations);
+        }
         match stabilised {
-            true if equations > DIRECT_STABILISED[at] => Linear::Multigrid,
-            false if equations > DIRECT_UNSTABILISED[at] && trials.pause == 0 => Linear::Trial,
-            _ => Self::direct::<D>(equations),
+            true => Linear::Multigrid,
+            false if trials.pause == 0 => Linear::Trial,
+            false => Self::direct::<D>(equations),
         }
     }
 

@@ -3,7 +3,7 @@
 
 use crate::common::run::{Run, relative_difference};
 
-/// A block under its weight off the grid lines, 20 808 equations: above the direct solver's limit.
+/// A block under its weight off the grid lines, 20 808 equations: beyond the direct solver's limit.
 const BLOCK: &str = r#"
 [analysis]
 type = "quasi-static"
