@@ -11,7 +11,7 @@ use crate::assembly::held::Held;
 use crate::assembly::in_place::{InPlace, Layout};
 use crate::assembly::internal::{self, Health, StepPoints};
 use crate::assembly::scatter::{self, BlockRows};
-use crate::assembly::{BlockMatrix, Numbering, Pattern, mass};
+use crate::assembly::{Numbering, Pattern};
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -23,6 +23,7 @@ use crate::petsc::{BlockProduct, Hierarchy};
 use crate::points::Points;
 
 use super::discretise::Discretisation;
+use super::linear_terms::{GhostTerm, Inertia};
 
 /// Limits and choices of the iteration.
 #[derive(Debug, Clone, Copy)]
@@ -70,22 +71,6 @@ pub struct Equilibrium<'a, const D: usize> {
     pub assembly_seconds: f64,
 }
 
-/// Inertia that moves with the increments u: the equations become
-/// share (f_int(u) + K_G u) + matrix u = f_ext.
-#[derive(Debug)]
-pub struct Inertia {
-    /// 1 + alpha of the HHT method, 1 for Newmark's.
-    pub share: f64,
-    /// M~ / (beta dt^2) in its owners' rows, kg/s2.
-    pub matrix: BlockMatrix<1>,
-}
-
-/// K_G and which of its rows are not zero.
-struct GhostTerm {
-    matrix: BlockMatrix<1>,
-    reaches: Vec<bool>,
-}
-
 /// What the values of the matrix are, compared with the last evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Tangent {
@@ -119,13 +104,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let layout = Layout::<D>::new(numbering, pattern);
         let held =
             Held::new::<D>(numbering, pattern, held, &conditions.fixed, |row| layout.start(row));
-        let ghost = ghost_matrix(world, mesh, |face| face.stiffness)?.map(|matrix| {
-            let reaches = |row: usize| {
-                let values = &matrix.values[pattern.offsets[row]..pattern.offsets[row + 1]];
-                values.iter().any(|&value| value != 0.0)
-            };
-            GhostTerm { reaches: (0..numbering.owned).map(reaches).collect(), matrix }
-        });
+        let ghost = GhostTerm::new(world, mesh)?;
         let beside = vec![0.0; layout.len_beside()];
         Ok(Equilibrium {
             world,
@@ -264,8 +243,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             ghost.add_product::<D>(self.pattern, &self.displacement, &mut force);
         }
         if let Some(inertia) = &self.inertia {
-            force.iter_mut().for_each(|value| *value *= inertia.share);
-            add_product::<D>(&inertia.matrix, self.pattern, &self.displacement, &mut force);
+            inertia.add_force::<D>(self.pattern, &self.displacement, &mut force);
         }
         self.internal_owned = force;
         let Some(mut rows) = rows else { return Ok(true) };
@@ -441,52 +419,6 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 }
 
-/// The faces' share of a scalar matrix, `weight(face) * J_G`; `None` if it vanishes everywhere.
-pub fn ghost_matrix<const D: usize>(
-    world: &World,
-    mesh: &Discretisation<D>,
-    weight: impl Fn(&crate::ghost::FaceStencil) -> f64,
-) -> Result<Option<BlockMatrix<1>>> {
-    if !world.any(mesh.faces.iter().any(|face| weight(face) != 0.0)) {
-        return Ok(None);
-    }
-    let mut matrix = BlockMatrix::zeros(&mesh.pattern);
-    // Supports of the faces follow those of the groups.
-    for (support, face) in (mesh.groups.len()..).zip(&mesh.faces) {
-        let factor = weight(face);
-        let block: Vec<f64> = face.matrix.iter().map(|value| factor * value).collect();
-        mass::add_support(&mut matrix, &mesh.pattern, support, &block);
-    }
-    matrix.reduce(world, &mesh.pattern)?;
-    Ok(Some(matrix))
-}
-
-impl GhostTerm {
-    /// force += K_G u over the owned rows.
-    fn add_product<const D: usize>(
-        &self,
-        pattern: &Pattern,
-        displacement: &[f64],
-        force: &mut [f64],
-    ) {
-        for row in (0..force.len() / D).filter(|&row| self.reaches[row]) {
-            add_row_product::<D>(&self.matrix, pattern, displacement, row, force);
-        }
-    }
-}
-
-impl Inertia {
-    /// K = share K + matrix.
-    fn join<const D: usize, R: BlockRows<D>>(&self, pattern: &Pattern, owned: usize, rows: &mut R) {
-        for row in 0..owned {
-            let blocks = pattern.offsets[row + 1] - pattern.offsets[row];
-            let values = rows.values(rows.start(pattern, row), D * D * blocks);
-            values.iter_mut().for_each(|value| *value *= self.share);
-            scatter::add_scalar_row(&self.matrix, pattern, row, rows);
-        }
-    }
-}
-
 /// Mean size of the free diagonal entries over all ranks; 1 where there are none. Collective.
 fn mean_diagonal<const D: usize, R: BlockRows<D>>(
     world: &World,
@@ -507,33 +439,4 @@ fn mean_diagonal<const D: usize, R: BlockRows<D>>(
     }
     let (sum, count) = (world.sum(sum), world.sum_usize(count));
     if count > 0 && sum > 0.0 { sum / count as f64 } else { 1.0 }
-}
-
-/// force += (J ⊗ 1) u over the owned rows.
-fn add_product<const D: usize>(
-    scalar: &BlockMatrix<1>,
-    pattern: &Pattern,
-    displacement: &[f64],
-    force: &mut [f64],
-) {
-    for row in 0..force.len() / D {
-        add_row_product::<D>(scalar, pattern, displacement, row, force);
-    }
-}
-
-/// The same in one row.
-#[inline]
-fn add_row_product<const D: usize>(
-    scalar: &BlockMatrix<1>,
-    pattern: &Pattern,
-    displacement: &[f64],
-    row: usize,
-    force: &mut [f64],
-) {
-    for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
-        let (value, column) = (scalar.values[entry], pattern.columns[entry] as usize);
-        for i in 0..D {
-            force[row * D + i] += value * displacement[column * D + i];
-        }
-    }
 }

@@ -9,7 +9,7 @@ use crate::grid::Grid;
 use crate::parallel::World;
 
 use super::discretise::Discretisation;
-use super::equilibrium::ghost_matrix;
+use super::linear_terms::ghost_matrix;
 use super::nodal_sums::over_points;
 use crate::assembly::internal::StepPoints;
 

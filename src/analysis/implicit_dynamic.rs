@@ -16,9 +16,10 @@ use crate::points::Points;
 
 use super::clock::Clock;
 use super::discretise::{Coupling, Discretisation, Model};
-use super::equilibrium::{Equilibrium, Inertia};
+use super::equilibrium::Equilibrium;
 use super::grid_mass::{GridMass, Inverse};
 use super::ledger::{Entry, Ledger, StepSums};
+use super::linear_terms::Inertia;
 use super::newmark::{Newmark, PointRates, Rates};
 use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};

@@ -13,7 +13,7 @@
 //! | deck to points on their ranks | `setup.rs` | |
 //! | rigid motions held? | `support.rs` | |
 //! | locate, map and number: the grid side of a step | `discretise.rs` (`grid/locate.rs`) | Ghost Figure 1 a-c |
-//! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs` | Lagrangian eq. 26-30, 40 |
+//! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs`, `linear_terms.rs` | Lagrangian eq. 26-30, 40 |
 //! | Newton's method for a step | `newton.rs` | |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
@@ -41,6 +41,7 @@ pub mod extremes;
 pub mod grid_mass;
 pub mod implicit_dynamic;
 pub mod ledger;
+pub mod linear_terms;
 pub mod mapping;
 pub mod motion;
 pub mod newmark;
