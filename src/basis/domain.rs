@@ -26,7 +26,8 @@ use crate::points::Points;
 use crate::tensor::spectral::square_root;
 
 /// Updates `points.half_length` at the end of a step: after `deformation_gradient`, and the corners
-/// of `cpdi2`, have become those of the step's end, while `position` and `half_length` are still those of its start.
+/// of `cpdi2`, have become those of the step's end, while `position` and `half_length` are still
+/// those of its start.
 ///
 /// `increments` holds dF, one for each point (only read, and else may be empty, for
 /// `normal-incremental`), `displacement` gives the step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the

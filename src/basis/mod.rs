@@ -46,11 +46,11 @@ pub struct Influences<const D: usize> {
     pub weights: Vec<f64>,
     /// 1/m
     pub gradients: Vec<[f64; D]>,
-    /// Where the nodes come from, if that took a search.
+    /// Where the nodes come from, of bases that collect them place by place.
     pub cells: Cells,
 }
 
-/// Cells of each point, ascending, in compressed rows; no rows where arithmetic finds them.
+/// Cells of each point, ascending, in compressed rows; no rows for bases of a lattice's axes.
 #[derive(Debug, Clone, Default)]
 pub struct Cells {
     /// End of each row.

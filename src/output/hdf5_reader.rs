@@ -89,8 +89,9 @@ impl<'c> FileReader<'c> {
             let slab = Slab { first, rows, columns, flat: dataset.ndim() == 1 };
             let values = values.as_mut_ptr().cast();
             slab.transfer(&dataset, |memory, file, transfer| {
-                // SAFETY: the dataset, both dataspaces and the property list are open; `values` has room for the rows * columns elements of
-                // type T that the memory space selects, and HDF5 converts to T or fails.
+                // SAFETY: the dataset, both dataspaces and the property list are open; `values` has
+                // room for the rows * columns elements of type T that the memory space selects, and
+                // HDF5 converts to T or fails.
                 unsafe { H5Dread(dataset.id(), kind.id(), memory, file, transfer, values) }
             })
         });
