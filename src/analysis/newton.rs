@@ -155,7 +155,7 @@ fn solve_robustly<const D: usize>(
     matrix: &mut Matrix,
     solution: &mut Vector,
 ) -> Result<(NewtonOutcome, Option<String>)> {
-    let linear = Linear::of::<D>(equations, stabilised, trials);
+    let linear = Linear::of::<D>(equations, stabilised, trials)?;
     let most = problem.settings().max_evaluations;
     let mut snes = solver::newton(world, linear, null_pivots, most)?;
     let outcome = snes.solve(problem, matrix, solution)?;

@@ -13,6 +13,7 @@ use crate::grid::Grid;
 use crate::output::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
+use crate::petsc::options;
 use crate::petsc::snes::Snes;
 
 /// Equations up to which the direct solver is the default in 2D and 3D: multigrid is faster from
@@ -66,16 +67,25 @@ impl Trials {
 
 impl Linear {
     /// The default for a system of `equations` in `D` dimensions; `stabilised`: every body has
-    /// Ghost stiffness.
-    pub fn of<const D: usize>(equations: usize, stabilised: bool, trials: &Trials) -> Self {
+    /// Ghost stiffness. A solver that the user has chosen is not on trial.
+    pub fn of<const D: usize>(equations: usize, stabilised: bool, trials: &Trials) -> Result<Self> {
+        let direct = Self::direct::<D>(equations);
         if equations <= DIRECT[usize::from(D == 3)] {
-            return Self::direct::<D>(equations);
+            return Ok(direct);
         }
-        match stabilised {
-            true => Linear::Multigrid,
-            false if trials.pause == 0 => Linear::Trial,
-            false => Self::direct::<D>(equations),
-        }
+        let (method, preconditioner) = ("qs_ksp_type", "qs_pc_type");
+        let own_levels = options::is_users(preconditioner)?
+            && options::get(preconditioner)?.as_deref() == Some("mg");
+        Ok(if stabilised || own_levels {
+            Linear::Multigrid
+        } else if trials.pause > 0
+            || options::is_users(method)?
+            || options::is_users(preconditioner)?
+        {
+            direct
+        } else {
+            Linear::Trial
+        })
     }
 
     /// What to try when a step could not be solved with this one, be it that a linear solve failed

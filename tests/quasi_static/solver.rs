@@ -63,6 +63,24 @@ fn multigrid_is_tried_and_gives_what_the_direct_solver_gives() {
     }
 }
 
+/// A solver of the user's is neither cut off after the iterations of a trial nor given a
+/// preconditioner of an earlier iterate.
+#[test]
+fn a_solver_of_the_users_is_not_on_trial() {
+    let own = |method: &str, preconditioner: &str| {
+        block(1)
+            .set(format!("petsc.qs_ksp_type=\"{method}\""))
+            .set(format!("petsc.qs_pc_type=\"{preconditioner}\""))
+            .results()
+    };
+    let [slow, direct, levels] = [own("cg", "jacobi"), own("preonly", "lu"), own("cg", "mg")];
+    let evaluations = slow.count("newton_iterations.total");
+    assert!(slow.count("linear_iterations.total") > 100 * (evaluations - 1));
+    for other in [direct, levels] {
+        assert_eq!(other.count("newton_iterations.total"), evaluations);
+    }
+}
+
 /// Three iterations are too few: steps 1 and 12 try and fail, those between do not try. A restart
 /// remembers.
 #[test]
