@@ -31,7 +31,9 @@ fn main() {
     }
     if wanted("pairs") {
         // The papers' analyses take 20 to 50 steps.
-        pairs("2D gimp, 20 steps", "scaling", &["grid.h=0.02", "analysis.steps=20"]);
+        pairs("2D gimp, 2 x 2 points, 20 steps", "scaling", &["grid.h=0.02", "analysis.steps=20"]);
+        let many = ["grid.h=0.04", "body.0.points_per_cell=[4,4]", "analysis.steps=40"];
+        pairs("2D gimp, 4 x 4 points, 40 steps", "scaling", &many);
         let mut block = block_3d(30);
         block.push("analysis.steps=4".into());
         let block: Vec<&str> = block.iter().map(String::as_str).collect();
