@@ -147,8 +147,8 @@ impl<const D: usize> System<D> {
             &still,
             &mut force,
             Some(&mut stiffness),
-        )?;
-        stiffness.reduce(world, pattern)?;
+        );
+        stiffness.reduce(world, pattern);
         let mut stiffness_ghost = stiffness.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.stiffness)? {
             scatter::add_scalar(&share, pattern, &mut stiffness_ghost);

@@ -63,6 +63,8 @@ pub struct Discretisation<const D: usize> {
     pub group_nodes: Vec<u32>,
     /// Points that touch ghosts, and the others.
     pub border: Border,
+    /// The same of groups.
+    pub group_border: Border,
     pub populated: Populated,
     /// Faces owned here.
     pub faces: Vec<FaceStencil>,
@@ -174,6 +176,7 @@ impl<const D: usize> Discretisation<D> {
             })
             .collect();
         let border = Border::new(groups.group_of_point.iter().map(|&group| group_reaches[group]));
+        let group_border = Border::new(group_reaches.into_iter());
         let mut node_grip = vec![0.0; numbering.len()];
         if coupling == Coupling::Matrix {
             let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
@@ -204,6 +207,7 @@ impl<const D: usize> Discretisation<D> {
             groups,
             group_nodes,
             border,
+            group_border,
             populated,
             faces,
             numbering,
@@ -227,6 +231,7 @@ impl<const D: usize> Discretisation<D> {
             influences: &self.influences,
             groups: &self.groups,
             group_nodes: &self.group_nodes,
+            border: &self.group_border,
             volume: self.point_volume,
         }
     }

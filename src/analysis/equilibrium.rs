@@ -222,22 +222,31 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             None => None,
         };
         self.tangent = Tangent::Stale;
-        self.health = internal::assemble(
-            self.step,
-            self.settings.frame,
-            numbering,
-            self.pattern,
-            &self.displacement,
-            &mut force,
-            rows.as_mut(),
-        )?;
+        let (world, pattern, step) = (self.world, self.pattern, self.step);
+        let (frame, displacement) = (self.settings.frame, &self.displacement[..]);
+        let add = |groups: &[_], force: &mut [f64], rows: Option<&mut InPlace<'_, D>>| {
+            internal::assemble_groups(step, groups, frame, pattern, displacement, force, rows)
+        };
+        // What other ranks wait for comes first, and travels while the rest is added up.
+        let reaching = add(&step.border.reaching, &mut force, rows.as_mut());
+        if let Some(rows) = &mut rows {
+            rows.finish(pattern, numbering.owned);
+        }
+        let inner = numbering.halo.reverse_add_while(world, [&mut force[..]], D, |[force]| {
+            let Some(rows) = &mut rows else { return add(&step.border.inner, force, None) };
+            scatter::reduce_while(world, pattern, rows, |rows| {
+                let health = add(&step.border.inner, force, Some(&mut *rows));
+                rows.finish(pattern, 0);
+                health
+            })
+        });
+        self.health = reaching.and(inner);
         let refuse = !self.health.is_sound()
             || (self.settings.inverted == InvertedIterates::Reject
                 && self.health.inverted.is_some());
-        if self.world.any(refuse) {
+        if world.any(refuse) {
             return Ok(false);
         }
-        numbering.halo.reverse_add(self.world, &mut force, D)?;
         force.truncate(numbering.owned * D);
         if let Some(ghost) = &self.ghost {
             ghost.add_product::<D>(self.pattern, &self.displacement, &mut force);
@@ -247,8 +256,6 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         }
         self.internal_owned = force;
         let Some(mut rows) = rows else { return Ok(true) };
-        rows.finish(self.pattern);
-        scatter::reduce(self.world, self.pattern, &mut rows)?;
         if let Some(inertia) = &self.inertia {
             inertia.join(self.pattern, numbering.owned, &mut rows);
         }

@@ -41,7 +41,7 @@ pub fn ghost_matrix<const D: usize>(
         let block: Vec<f64> = face.matrix.iter().map(|value| factor * value).collect();
         mass::add_support(&mut matrix, &mesh.pattern, support, &block);
     }
-    matrix.reduce(world, &mesh.pattern)?;
+    matrix.reduce(world, &mesh.pattern);
     Ok(Some(matrix))
 }
 

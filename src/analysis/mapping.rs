@@ -201,6 +201,7 @@ pub fn deformation_increments<const D: usize>(
 
 #[cfg(test)]
 mod tests {
+    use crate::assembly::border::Border;
     use nalgebra::Matrix3;
 
     use super::*;
@@ -232,12 +233,14 @@ mod tests {
             let influences = basis::map_points(&grid, basis, &points).expect("inside");
             let groups = Groups::new(&influences);
             let group_nodes: Vec<u32> = groups.nodes.iter().map(|&node| node as u32).collect();
+            let border = Border::new(std::iter::repeat_n(false, groups.len()));
             let step = StepPoints {
                 points: &points,
                 materials: &[],
                 influences: &influences,
                 groups: &groups,
                 group_nodes: &group_nodes,
+                border: &border,
                 volume: PointVolume::default(),
             };
             for external in [&external[..], &[]] {

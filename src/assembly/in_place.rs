@@ -156,9 +156,9 @@ impl<'a, const B: usize> InPlace<'a, B> {
         Ok(rows)
     }
 
-    /// Clears the rows that nothing was added to.
-    pub fn finish(&mut self, pattern: &Pattern) {
-        for row in 0..self.fresh.len() {
+    /// Clears those from row `first` on that nothing was added to.
+    pub fn finish(&mut self, pattern: &Pattern, first: usize) {
+        for row in first..self.fresh.len() {
             self.touch(pattern, row);
         }
     }

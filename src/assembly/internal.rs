@@ -1,14 +1,16 @@
 //! f_int = Σ_p ∇S^T T V and K = Σ_p ∇S^T A ∇S V (Lagrangian eq. 20-23, 27, 28), one dense block
 //! per group of points that share their nodes.
 
+use std::ops::Range;
+
 use crate::basis::{Groups, Influences};
 use crate::deck::model::{Frame, PointVolume};
-use crate::error::Result;
 use crate::material::Material;
 use crate::mechanics::{self, Contribution, StepStart};
 use crate::points::Points;
 use crate::tensor::fused::{self, multiply_add};
 
+use super::border::Border;
 use super::kernel::Batch;
 use super::scatter::BlockRows;
 use super::{Numbering, Pattern};
@@ -23,6 +25,8 @@ pub struct StepPoints<'a, const D: usize> {
     pub groups: &'a Groups,
     /// Local node index of each entry of `groups.nodes`.
     pub group_nodes: &'a [u32],
+    /// Groups that touch nodes of other ranks, and the others.
+    pub border: &'a Border,
     pub volume: PointVolume,
 }
 
@@ -54,6 +58,14 @@ impl Health {
     pub fn is_sound(&self) -> bool {
         self.not_finite.is_none()
     }
+
+    /// Of both, the first to be named of either kind.
+    pub fn and(self, other: Health) -> Health {
+        Health {
+            inverted: self.inverted.or(other.inverted),
+            not_finite: self.not_finite.or(other.not_finite),
+        }
+    }
 }
 
 /// Internal force at the local nodes (ghost shares included, not yet sent) and, if `stiffness`
@@ -68,16 +80,34 @@ pub fn assemble<const D: usize, R: BlockRows<D>>(
     pattern: &Pattern,
     displacement: &[f64],
     force: &mut [f64],
-    stiffness: Option<&mut R>,
-) -> Result<Health> {
+    mut stiffness: Option<&mut R>,
+) -> Health {
     debug_assert!(numbering.len() * D <= force.len());
-    let task = Task { step, frame, pattern, displacement };
+    let mut health = Health::default();
+    for part in [&step.border.reaching, &step.border.inner] {
+        let rows = stiffness.as_deref_mut();
+        health = health.and(assemble_groups(step, part, frame, pattern, displacement, force, rows));
+    }
+    health
+}
+
+/// [`assemble`] of some groups.
+pub fn assemble_groups<const D: usize, R: BlockRows<D>>(
+    step: StepPoints<'_, D>,
+    which: &[Range<usize>],
+    frame: Frame,
+    pattern: &Pattern,
+    displacement: &[f64],
+    force: &mut [f64],
+    stiffness: Option<&mut R>,
+) -> Health {
+    let task = Task { step, which, frame, pattern, displacement };
     #[cfg(target_arch = "x86_64")]
     if fused::has_avx2() {
         // SAFETY: the processor has just said that it knows the instructions.
-        return Ok(unsafe { assemble_avx2(&task, force, stiffness) });
+        return unsafe { assemble_avx2(&task, force, stiffness) };
     }
-    Ok(task.assemble::<false, R>(force, stiffness))
+    task.assemble::<false, R>(force, stiffness)
 }
 
 /// [`Task::assemble`] compiled for AVX2 with fused multiply-add.
@@ -94,6 +124,8 @@ fn assemble_avx2<const D: usize, R: BlockRows<D>>(
 /// What an evaluation reads.
 struct Task<'a, const D: usize> {
     step: StepPoints<'a, D>,
+    /// Groups.
+    which: &'a [Range<usize>],
     frame: Frame,
     pattern: &'a Pattern,
     displacement: &'a [f64],
@@ -126,7 +158,7 @@ impl<const D: usize> Task<'_, D> {
             batch: Batch::default(),
         };
         let groups = self.step.groups;
-        for group in 0..groups.len() {
+        for group in self.which.iter().cloned().flatten() {
             let range = groups.node_offsets[group]..groups.node_offsets[group + 1];
             let nodes = &self.step.group_nodes[range];
             work.displacement.clear();

@@ -53,7 +53,7 @@ pub fn consistent<const D: usize>(
         }
         add_support(&mut matrix, pattern, group, &block);
     }
-    matrix.reduce(world, pattern)?;
+    matrix.reduce(world, pattern);
     Ok(matrix)
 }
 

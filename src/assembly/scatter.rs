@@ -1,7 +1,6 @@
 //! Dense blocks of groups and faces, added into the rows of their owners.
 
-use crate::error::Result;
-use crate::parallel::{World, exchange};
+use crate::parallel::{World, exchange_known};
 
 use super::{Numbering, Pattern};
 
@@ -83,9 +82,9 @@ impl<const B: usize> BlockMatrix<B> {
         }
     }
 
-    /// [`reduce`] of this matrix. Collective.
-    pub fn reduce(&mut self, world: &World, pattern: &Pattern) -> Result<()> {
-        reduce(world, pattern, self)
+    /// [`reduce_while`] of this matrix. Collective over neighbours.
+    pub fn reduce(&mut self, world: &World, pattern: &Pattern) {
+        reduce_while(world, pattern, self, |_| ());
     }
 }
 
@@ -119,26 +118,29 @@ pub fn add_scalar_row<const B: usize, R: BlockRows<B>>(
     }
 }
 
-/// Sends the ghost rows to their owners, who add them in ascending rank order. Collective.
-pub fn reduce<const B: usize, R: BlockRows<B>>(
+/// Sends the ghost rows to their owners, who add them in ascending rank order, while `work` adds to
+/// the owned ones. Collective over neighbours.
+pub fn reduce_while<const B: usize, R: BlockRows<B>, T>(
     world: &World,
     pattern: &Pattern,
     rows: &mut R,
-) -> Result<()> {
+    work: impl FnOnce(&mut R) -> T,
+) -> T {
     let ghosts = rows.ghosts(pattern);
-    let outgoing = pattern
+    let outgoing: Vec<(usize, Vec<f64>)> = pattern
         .sends
         .iter()
         .map(|(rank, range)| (*rank, ghosts[B * B * range.start..B * B * range.end].to_vec()))
         .collect();
-    let incoming = exchange(world, outgoing)?;
-    let mut by_rank = incoming.into_iter();
-    for (rank, positions) in &pattern.receives {
-        let Some((from, words)) = by_rank.next() else { break };
-        debug_assert_eq!(from, *rank);
-        add_received(pattern, rows, positions, &words);
+    let mut incoming: Vec<Vec<f64>> =
+        pattern.receives.iter().map(|(_, at)| vec![0.0; at.len() * B * B]).collect();
+    let slots = pattern.receives.iter().zip(&mut incoming);
+    let slots = slots.map(|((rank, _), words)| (*rank, &mut words[..])).collect();
+    let done = exchange_known(world, &outgoing, slots, || work(rows));
+    for ((_, positions), words) in pattern.receives.iter().zip(&incoming) {
+        add_received(pattern, rows, positions, words);
     }
-    Ok(())
+    done
 }
 
 /// Entries arrive in the sender's layout: row by row, each row as B scalar rows.

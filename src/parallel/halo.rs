@@ -91,7 +91,7 @@ impl HaloPlan {
             }
             rest = tail;
         }
-        swap(world, &packed, slots, || ());
+        exchange_known(world, &packed, slots, || ());
         Ok(())
     }
 
@@ -124,7 +124,7 @@ impl HaloPlan {
             .map(|(rank, locals)| (*rank, &locals[..], vec![0.0; locals.len() * block]))
             .collect();
         let slots = received.iter_mut().map(|(rank, _, buffer)| (*rank, &mut buffer[..])).collect();
-        swap(world, &packed, slots, || ());
+        exchange_known(world, &packed, slots, || ());
         for (_, locals, buffer) in &received {
             add(values, locals, buffer, block);
         }
@@ -151,7 +151,9 @@ impl HaloPlan {
             self.ghosts.iter().map(|(_, range)| vec![0.0; range.len() * block * N]).collect();
         let slots =
             self.ghosts.iter().zip(&mut received).map(|((rank, _), slot)| (*rank, &mut slot[..]));
-        let done = swap(world, &packed, slots.collect(), || work(fields.each_ref().map(|f| &**f)));
+        let done = exchange_known(world, &packed, slots.collect(), || {
+            work(fields.each_ref().map(|f| &**f))
+        });
         for ((_, range), buffer) in self.ghosts.iter().zip(&received) {
             for (field, part) in fields.iter_mut().zip(buffer.chunks_exact(range.len() * block)) {
                 field[range.start * block..range.end * block].copy_from_slice(part);
@@ -184,8 +186,9 @@ impl HaloPlan {
             self.copies.iter().map(|(_, locals)| vec![0.0; locals.len() * block * N]).collect();
         let slots =
             self.copies.iter().zip(&mut received).map(|((rank, _), slot)| (*rank, &mut slot[..]));
-        let done =
-            swap(world, &packed, slots.collect(), || work(fields.each_mut().map(|f| &mut **f)));
+        let done = exchange_known(world, &packed, slots.collect(), || {
+            work(fields.each_mut().map(|f| &mut **f))
+        });
         for ((_, locals), buffer) in self.copies.iter().zip(&received) {
             for (field, part) in fields.iter_mut().zip(buffer.chunks_exact(locals.len() * block)) {
                 add(field, locals, part, block);
@@ -230,7 +233,7 @@ fn add(values: &mut [f64], locals: &[u32], blocks: &[f64], block: usize) {
 }
 
 /// Known messages both ways, every send with its receive, and `work` while they travel.
-fn swap<R>(
+pub fn exchange_known<R>(
     world: &World,
     sends: &[(usize, Vec<f64>)],
     receives: Vec<(usize, &mut [f64])>,

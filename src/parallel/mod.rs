@@ -27,7 +27,7 @@ pub mod traffic;
 pub mod world;
 
 pub use exchange::exchange;
-pub use halo::HaloPlan;
+pub use halo::{HaloPlan, exchange_known};
 pub use migrate::{migrate, settle};
 pub use partition::Partition;
 pub use traffic::Traffic;
