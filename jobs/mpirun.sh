@@ -27,10 +27,18 @@ export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}"
 # only the next is meant as it is. In a session of its own Ctrl-C does not reach mpirun first.
 own=
 command -v setsid >/dev/null 2>&1 && own=setsid
+# Before the start: a signal in between would end this script and leave the job behind.
+job=
+asked=
+stop() {
+    asked=yes
+    [ -z "$job" ] || kill -USR1 "$job" 2>/dev/null || true
+}
+trap stop USR1
+trap 'stop; trap "[ -z \"\$job\" ] || kill -TERM \$job 2>/dev/null" TERM INT HUP' TERM INT HUP
 $own mpirun -n "$ranks" "$@" &
 job=$!
-trap 'kill -USR1 "$job" 2>/dev/null' USR1
-trap 'kill -USR1 "$job" 2>/dev/null; trap "kill -TERM $job 2>/dev/null" TERM INT HUP' TERM INT HUP
+[ -z "$asked" ] || stop
 # A signal ends the wait, not the job.
 code=0
 wait "$job" || code=$?

@@ -1,16 +1,20 @@
 #!/usr/bin/env python3
-"""Strong, weak and size scaling of inputs/scaling.toml: tables (csv) and plots (svg).
+"""Tables (csv) and plots (svg) of inputs/scaling.toml on more ranks and with more points.
 
-scaling.py strong|weak|sizes|all [--ranks 1 2 4] [--h 0.03125] [--out docs/figures] [--repeat 3]
+scaling.py KIND [--ranks 1 2 4] [--h 0.03125] [--out docs/figures] [--repeat 3]
 
 strong: one problem on more ranks. weak: as many points per rank, by finer cells. sizes: one rank
-count, finer cells. Each with Ghost stabilisation and, where --bare asks for it, without.
+count, finer cells. These with Ghost stabilisation and, where --bare asks for it, without. memory: a
+million points on 1, 2 and 4 ranks. work: one rank, linear solves to several tolerances, processor
+time. all: these five, and a model for more ranks than there are.
 
 Times are medians. On more ranks than the machine has cores a time says nothing about the
 program: such rows keep their counts (messages, bytes, reductions, rows, iterations), and their
 times are left empty. `all` runs each pair of ranks and cell size once and uses it wherever it is
-needed; what it has measured is kept in --work, and --resume goes on from there. Needs Python's
-standard library only.
+needed; what it has measured is kept in --work, and --resume goes on from there.
+
+A table gets its name when it is whole. Exit code 1 if a run with Ghost failed: its table and plots
+are not written (without Ghost a failure leaves an empty row). Needs Python's standard library only.
 """
 import argparse
 import csv
@@ -18,14 +22,17 @@ import json
 import math
 import os
 import re
+import resource
 import statistics
 import subprocess
 import sys
 
+from scaling_model import exponent, model, write_model
+from scaling_plots import PHASES, write_plots
+
 ROOT = os.environ.get("ROOT") or os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 PROGRAM = os.environ.get("PROGRAM") or os.path.join(ROOT, "target/release/mpm-par")
 MACHINE = os.environ.get("MACHINE", "local")
-PHASES = ["setup", "locate", "assemble", "solve", "update", "migrate", "output"]
 COUNTS = ["h", "ghost", "points", "rows", "steps", "newton", "linear", "per_solve",
           "messages_max", "messages_mean", "bytes_max", "bytes_mean", "reductions",
           "own_messages_max", "own_bytes_max", "own_reductions", "replicated_bytes",
@@ -47,20 +54,23 @@ def finer(h, times):
     return WIDTH / (UNIT * max(1, round(cells / UNIT)))
 
 
-def run(ranks, h, ghost, out, more, patience):
-    """One run; its summary and what the linear solver's log says, or None if it failed."""
+def processor_seconds():
+    """Of all children so far."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def launched(ranks, h, ghost, out, more, patience):
+    """Starts the program; its processor seconds, those of mpirun among them, or None."""
     words = [PROGRAM, os.path.join(ROOT, "inputs/scaling.toml"), "--out", out, "--force"]
-    settings = [f"grid.h={h!r}"] + ([] if ghost else ["ghost="]) + more
-    for setting in settings:
-        words += ["--set", setting]
-    log = out + ".log_view"
-    words += ["-log_view", ":" + log]
+    words += [word for word in more if word == "--check"]
+    for setting in [f"grid.h={h!r}"] + ([] if ghost else ["ghost="]) + more:
+        words += ["--set", setting] if setting != "--check" else []
+    words += ["-log_view", ":" + out + ".log_view"]
     script = '. "$ROOT/jobs/machines/$MACHINE.sh"; launch "$@"'
     env = dict(os.environ, ROOT=ROOT, MACHINE=MACHINE)
-    for old in (log, os.path.join(out, "summary.json")):
-        if os.path.exists(old):
-            os.remove(old)
     start = ["timeout", str(patience)] if patience else []
+    before = processor_seconds()
     done = subprocess.run(start + ["bash", "-c", script, "bash", str(ranks)] + words, env=env,
                           stdin=subprocess.DEVNULL, capture_output=True, text=True)
     if done.returncode:
@@ -68,10 +78,20 @@ def run(ranks, h, ghost, out, more, patience):
         print(f"{ranks} ranks, h = {h:g}, Ghost {ghost}: exit code {done.returncode} "
               f"{reason[:1]}", flush=True)
         return None
-    with open(os.path.join(out, "summary.json")) as file:
-        summary = json.load(file)
-    with open(log) as file:
-        return summary, file.read()
+    return processor_seconds() - before
+
+
+def run(ranks, h, ghost, out, more, patience):
+    """One run: summary, what the linear solver's log says, processor seconds; None if it failed."""
+    names = (os.path.join(out, "summary.json"), out + ".log_view")
+    for old in names:
+        if os.path.exists(old):
+            os.remove(old)
+    seconds = launched(ranks, h, ghost, out, more, patience)
+    if seconds is None or not all(os.path.exists(name) for name in names):
+        return None
+    with open(names[0]) as summary, open(names[1]) as log:
+        return json.load(summary), log.read(), seconds
 
 
 def logged(text, name):
@@ -90,7 +110,7 @@ def row_of(ranks, h, ghost, out, repeat, more, limit, patience):
             for _ in range(repeat if ranks <= limit else 1)]
     if any(one is None for one in runs):
         return {"ranks": ranks, "h": h, "ghost": int(ghost)}
-    summary, log = runs[0]
+    summary, log, _ = runs[0]
     steps = summary["steps_completed"]
     # PETSc counts its own messages and bytes; those of the program itself come on top.
     own = summary["communication"]
@@ -126,154 +146,49 @@ def row_of(ranks, h, ghost, out, repeat, more, limit, patience):
     }
     if ranks <= limit:
         for phase in ["total"] + PHASES:
-            times = [summary["wall_seconds"][phase] for summary, _ in runs]
+            times = [summary["wall_seconds"][phase] for summary, *_ in runs]
             row[phase] = statistics.median(times)
     return row
 
 
-def exponent(pairs):
-    """Slope of log y over log x by least squares."""
-    pairs = [(math.log(x), math.log(y)) for x, y in pairs if x > 0 and y > 0]
-    if len(pairs) < 2:
-        return float("nan")
-    mx, my = (sum(p[k] for p in pairs) / len(pairs) for k in (0, 1))
-    return sum((x - mx) * (y - my) for x, y in pairs) / sum((x - mx) ** 2 for x, _ in pairs)
-
-
-def write_table(path, rows):
+def write_table(path, rows, columns):
     with open(path, "w", newline="") as file:
-        table = csv.DictWriter(file, ["ranks"] + COUNTS + ["total"] + PHASES, restval="")
+        table = csv.DictWriter(file, columns, restval="")
         table.writeheader()
         for row in rows:
             table.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
 
 
-class Plot:
-    """A plot of lines over rank counts or sizes on logarithmic axes, or of stacked shares."""
-
-    WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 420, 260, 64, 84, 30, 44
-    COLOURS = ["#1f77b4", "#d62728", "#2ca02c", "#9467bd", "#ff7f0e", "#8c564b", "#17becf"]
-
-    def __init__(self, title, ranks, axis="ranks"):
-        self.title, self.ranks, self.axis = title, ranks, axis
-        self.parts, self.legend = [], []
-
-    def x(self, ranks):
-        first, last = min(self.ranks), max(max(self.ranks), min(self.ranks) * 2)
-        share = _log(ranks / first) / _log(last / first)
-        return self.LEFT + share * (self.WIDTH - self.LEFT - self.RIGHT)
-
-    def y(self, share):
-        return self.HEIGHT - self.BOTTOM - share * (self.HEIGHT - self.TOP - self.BOTTOM)
-
-    def lines(self, series):
-        """series: {name: [(ranks, value)]}, positive values."""
-        values = [v for points in series.values() for _, v in points if v > 0]
-        if not values:
-            return self.note("nothing to show")
-        low, high = min(values), max(values)
-        if high < 1.5 * low:
-            low, high = low / 1.3, high * 1.3
-        place = lambda v: self.y(_log(v / low) / _log(high / low))
-        for value in (low, (low * high) ** 0.5, high):
-            self.parts.append(
-                f'<line x1="{self.LEFT}" x2="{self.WIDTH - self.RIGHT}" y1="{place(value):.1f}" '
-                f'y2="{place(value):.1f}" stroke="#ddd"/><text x="{self.LEFT - 6}" '
-                f'y="{place(value) + 4:.1f}" text-anchor="end">{value:.3g}</text>')
-        for k, (name, points) in enumerate(series.items()):
-            colour = self.COLOURS[k % len(self.COLOURS)]
-            points = [(self.x(r), place(v)) for r, v in points if v > 0]
-            path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-            self.parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" '
-                              f'stroke-width="1.5"/>')
-            self.parts += [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.5" fill="{colour}"/>'
-                           for x, y in points]
-            self.legend.append((name, colour))
-        return self
-
-    def shares(self, rows, names):
-        for row in rows:
-            below, total = 0.0, sum(row[name] for name in names) or 1.0
-            for k, name in enumerate(names):
-                share = row[name] / total
-                self.parts.append(
-                    f'<rect x="{self.x(row[self.axis]) - 8:.1f}" y="{self.y(below + share):.1f}" '
-                    f'width="16" height="{self.y(below) - self.y(below + share):.1f}" '
-                    f'fill="{self.COLOURS[k]}"/>')
-                below += share
-        self.legend += list(zip(names, self.COLOURS))
-        return self
-
-    def note(self, text):
-        self.parts.append(f'<text x="{self.WIDTH / 2}" y="{self.HEIGHT / 2}" '
-                          f'text-anchor="middle">{text}</text>')
-        return self
-
-    def svg(self, left, top):
-        body = [f'<g transform="translate({left},{top})">',
-                f'<text x="{self.WIDTH / 2}" y="16" text-anchor="middle" '
-                f'font-weight="bold">{self.title}</text>']
-        body += self.parts
-        for ranks in self.ranks:
-            body.append(f'<text x="{self.x(ranks):.1f}" y="{self.HEIGHT - self.BOTTOM + 16}" '
-                        f'text-anchor="middle">{ranks:.3g}</text>')
-        body.append(f'<text x="{self.WIDTH / 2}" y="{self.HEIGHT - 12}" '
-                    f'text-anchor="middle">{self.axis}</text>')
-        for k, (name, colour) in enumerate(self.legend):
-            y = self.TOP + 10 + 13 * k
-            body.append(f'<text x="{self.WIDTH - self.RIGHT + 10}" y="{y}" '
-                        f'fill="{colour}">{name}</text>')
-        return "\n".join(body + ["</g>"])
+def publish(path, write):
+    """What `write` makes gets its name when it is whole."""
+    write(path + ".partial")
+    os.replace(path + ".partial", path)
 
 
-def _log(value):
-    return math.log(value) if value > 0 else 0.0
-
-
-def write_plots(path, kind, rows):
-    """Of the rows that did not fail; without Ghost only their iterations."""
-    bare = [row for row in rows if not row["ghost"] and "linear" in row]
-    rows = [row for row in rows if row["ghost"] and "linear" in row]
-    if not rows:
-        return
-    key = "points" if kind == "sizes" else "ranks"
-    places = [row[key] for row in rows]
-    timed = [row for row in rows if "total" in row]
-    plot = lambda title: Plot(title, places, key)
-    over = lambda name, rows=rows: [(row[key], row[name]) for row in rows]
-    plots = []
-    if timed and kind != "sizes":
-        first = timed[0]
-        work = lambda row: row["points"] / first["points"]
-        plots.append(plot("speed over the first row").lines({
-            "measured": [(row[key], first["total"] / row["total"] * work(row)) for row in timed],
-            "ideal": [(row[key], row[key] / first[key]) for row in timed],
-        }))
-    if timed:
-        plots.append(plot("share of the phases").shares(timed, PHASES))
-    iterations = {"with Ghost": over("per_solve")}
-    if bare:
-        iterations["without"] = over("per_solve", bare)
-    plots.append(plot("linear iterations per solve").lines(iterations))
-    if kind != "sizes":
-        plots.append(plot("messages per rank and step").lines(
-            {"largest": over("messages_max"), "mean": over("messages_mean")}))
-        plots.append(plot("bytes per rank and step").lines(
-            {"largest": over("bytes_max"), "mean": over("bytes_mean")}))
-        plots.append(plot("reductions per step").lines({"": over("reductions")}))
-    plots.append(plot("memory of the largest rank, bytes").lines({"": over("memory_max")}))
-    columns = 2
-    height = Plot.HEIGHT * -(-len(plots) // columns) + 40
-    with open(path, "w") as file:
-        file.write(f'<svg xmlns="http://www.w3.org/2000/svg" width="{Plot.WIDTH * columns}" '
-                   f'height="{height}" font-family="sans-serif" font-size="11">\n'
-                   f'<rect width="100%" height="100%" fill="white"/>\n'
-                   f'<text x="{Plot.WIDTH}" y="24" text-anchor="middle" font-size="14">'
-                   f'{kind}: inputs/scaling.toml</text>\n')
-        for k, one in enumerate(plots):
-            file.write(one.svg(Plot.WIDTH * (k % columns), 36 + Plot.HEIGHT * (k // columns)))
-            file.write("\n")
-        file.write("</svg>\n")
+def work(out, repeat, more, patience):
+    """Processor seconds on one rank of solves to several tolerances, medians; None if one failed."""
+    folder, h = os.path.join(out, "work"), 0.025
+    starts = [launched(1, h, True, folder, more + ["--check"], patience) for _ in range(repeat)]
+    if None in starts:
+        return None
+    start, rows = statistics.median(starts), []
+    for tolerance in ("1e-8", "1e-5", "1e-3", "1e-2"):
+        runs = [run(1, h, True, folder, more + [f"petsc.qs_ksp_rtol={tolerance}"], patience)
+                for _ in range(repeat)]
+        if None in runs:
+            return None
+        summary, seconds = runs[0][0], statistics.median(one[2] for one in runs)
+        point_steps = summary["points"] * summary["steps_completed"]
+        rows.append({
+            "tolerance": tolerance, "points": summary["points"],
+            "steps": summary["steps_completed"], "newton": summary["newton_iterations"]["total"],
+            "linear": summary["linear_iterations"]["total"], "processor": seconds,
+            "start": start, "per_point_and_step": (seconds - start) / point_steps,
+        })
+        print(f"work   {tolerance} {rows[-1]['newton']:3} newton {rows[-1]['linear']:4} linear "
+              f"{seconds:.2f} s, {start:.2f} s of them the start: "
+              f"{rows[-1]['per_point_and_step']:.3g} s per point and step", flush=True)
+    return rows
 
 
 def report(kind, rows):
@@ -293,6 +208,9 @@ def report(kind, rows):
             print(f"sizes: bytes of the busiest rank and step grow as (points per rank)^"
                   f"{share('bytes_max'):.2f}, the program's own ^{share('own_bytes_max'):.2f}; "
                   f"a surface is ^0.5 in the plane")
+        for before, row in zip(mine, mine[1:]) if kind == "memory" else ():
+            print(f"memory: {row['ranks']} ranks {row['memory_max'] / 1e6:.0f} MB, "
+                  f"{row['memory_max'] / before['memory_max']:.2f} of {before['ranks']}")
         many = [row for row in mine if row["ranks"] >= 4]
         if ghost and kind == "strong" and len(many) >= 3:
             share = lambda name: exponent([(row["points"] / row["ranks"], row[name])
@@ -303,54 +221,14 @@ def report(kind, rows):
                   f"a surface is ^0.5 in the plane")
 
 
-# Assumed of a large machine: s per message, bytes per s and rank, s per reduction and doubling.
-LATENCY, BANDWIDTH, REDUCTION = 2e-6, 1e9, 2e-6
-# Processor seconds per point and step of this deck on one rank (docs/scaling.md).
-PER_POINT = 3.1e-6
-
-
-def model(weak, sizes):
-    """What the counts say of rank counts that nobody has here."""
-    rows = [row for row in weak if row["ghost"] and row["ranks"] >= 4 and "linear" in row]
-    seen = rows[-1]
-
-    def grown(name, ranks):
-        """At the weak series' points per rank: linear in log2 of the ranks, and never less than on
-        the most ranks counted."""
-        pairs = [(math.log2(row["ranks"]), row[name]) for row in rows]
-        mx, my = (sum(p[k] for p in pairs) / len(pairs) for k in (0, 1))
-        slope = (sum((x - mx) * (y - my) for x, y in pairs)
-                 / sum((x - mx) ** 2 for x, _ in pairs))
-        return max(my + slope * (math.log2(ranks) - mx), seen[name])
-
-    def power(name):
-        return exponent([(row["points"], row[name]) for row in sizes
-                         if row["ghost"] and "linear" in row])
-
-    print("| ranks | points per rank | messages | MB | reductions | work s | messages s | "
-          "bytes s | reductions s | efficiency |\n" + "|---" * 10 + "|")
-    for ranks in (64, 1000, 10_000, 100_000):
-        for points in (20_000, 50_000, 200_000):
-            larger = points / (seen["points"] / seen["ranks"])
-            messages = grown("messages_max", ranks) * larger ** power("messages_max")
-            size = grown("bytes_max", ranks) * larger ** power("bytes_max")
-            reductions = grown("reductions", ranks) * larger ** power("reductions")
-            work = PER_POINT * points
-            parts = (messages * LATENCY, size / BANDWIDTH,
-                     reductions * REDUCTION * math.log2(ranks))
-            print(f"| {ranks} | {points} | {messages:.0f} | {size / 1e6:.1f} | {reductions:.0f} | "
-                  f"{work:.2f} | {parts[0]:.3f} | {parts[1]:.3f} | {parts[2]:.3f} | "
-                  f"{100 * work / (work + sum(parts)):.0f} % |")
-
-
 def main():
     words = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    words.add_argument("kind", choices=["strong", "weak", "sizes", "all"])
+    words.add_argument("kind", choices=["strong", "weak", "sizes", "memory", "work", "all"])
     words.add_argument("--ranks", type=int, nargs="+")
     words.add_argument("--h", type=float, default=0.03125,
                        help="cell size, m: of strong; of weak on the largest rank count")
-    words.add_argument("--out", help="tables and plots; docs/figures for all")
-    words.add_argument("--work", default=os.path.join(ROOT, "out/scaling"))
+    words.add_argument("--out", help="tables and plots; docs/figures for all, else --work")
+    words.add_argument("--work", help="runs (out/scaling/KIND)")
     words.add_argument("--repeat", type=int, default=3)
     words.add_argument("--bare", type=int, nargs="*", default=None,
                        help="rank counts that run without Ghost as well")
@@ -359,41 +237,52 @@ def main():
     words.add_argument("--set", action="append", default=[], help="a key of the deck")
     words = words.parse_args()
     everything = words.kind == "all"
-    out = words.out or (os.path.join(ROOT, "docs/figures") if everything else words.work)
+    folder = words.work or os.path.join(ROOT, "out/scaling", words.kind)
+    out = words.out or (os.path.join(ROOT, "docs/figures") if everything else folder)
     os.makedirs(out, exist_ok=True)
-    os.makedirs(words.work, exist_ok=True)
+    os.makedirs(folder, exist_ok=True)
     # On a cluster the batch system counts the cores.
     ranks = sorted(words.ranks or ([1, 2, 4, 8, 16, 32, 64] if everything else [1, 2]))
     limit = cores() if MACHINE == "local" else max(ranks)
-    bare = words.bare if words.bare is not None else ([1, 2, 4, 16] if everything else [])
+    bare = words.bare if words.bare is not None else (ranks if everything else [])
 
-    known, store = {}, os.path.join(words.work, "rows.json")
+    known, store = {}, os.path.join(folder, "rows.json")
     if words.resume and os.path.exists(store):
         with open(store) as file:
             known = json.load(file)
 
+    def remember(path):
+        with open(path, "w") as file:
+            json.dump(known, file, indent=1)
+
     def measured(n, h, ghost):
         key = f"{n} {h!r} {int(ghost)} {words.set}"
-        if key not in known:
-            known[key] = row_of(n, h, ghost, words.work, words.repeat, words.set, limit,
-                                words.patience)
-            with open(store, "w") as file:
-                json.dump(known, file, indent=1)
-        return known[key]
+        if key in known:
+            return known[key]
+        row = row_of(n, h, ghost, folder, words.repeat, words.set, limit, words.patience)
+        if "linear" in row:
+            known[key] = row
+            publish(store, remember)
+        return row
 
-    weak_h = {n: finer(words.h, n / ranks[-1]) for n in ranks}
-    # 10^4 to 10^6 points on as many ranks as there are cores.
-    sizes = [(min(limit, 2), WIDTH / cells) for cells in (80, 160, 320, 480, 800)]
-    plans = {"strong": [(n, words.h) for n in ranks], "weak": [(n, weak_h[n]) for n in ranks],
-             "sizes": sizes}
-    tables = {}
+    plans = {
+        "strong": [(n, words.h) for n in ranks],
+        "weak": [(n, finer(words.h, n / ranks[-1])) for n in ranks],
+        # 10^4 to 10^6 points on as many ranks as there are cores.
+        "sizes": [(min(limit, 2), WIDTH / cells) for cells in (80, 160, 320, 480, 800)],
+        "memory": [(n, WIDTH / 800) for n in (words.ranks if words.ranks and not everything
+                                              else (1, 2, 4))],
+    }
+    place = lambda name: os.path.join(out, f"scaling-{name}")
+    tables, failed = {}, []
     for kind, plan in plans.items():
         if words.kind not in (kind, "all"):
             continue
         rows = tables[kind] = []
         for ghost in (True, False):
             for n, h in plan:
-                if not ghost and not (n in bare or (kind == "sizes" and words.bare != [])):
+                if not ghost and (kind == "memory" or not (
+                        n in bare or (kind == "sizes" and words.bare != []))):
                     continue
                 row = measured(n, h, ghost)
                 rows.append(row)
@@ -403,11 +292,24 @@ def main():
                           f"{row['points']:9} points {time} {row['newton']:4} newton "
                           f"{row['linear']:5} linear {row['messages_max']:9.0f} messages "
                           f"{row['bytes_max']:11.3g} bytes", flush=True)
-                write_table(os.path.join(out, f"scaling-{kind}.csv"), rows)
-        write_plots(os.path.join(out, f"scaling-{kind}.svg"), kind, rows)
         report(kind, rows)
-    if everything and sum(row["ranks"] >= 4 for row in tables["weak"]) > 2:
-        model(tables["weak"], tables["sizes"])
+        if any(row["ghost"] and "linear" not in row for row in rows):
+            failed.append(kind)
+            continue
+        columns = ["ranks"] + COUNTS + ["total"] + PHASES
+        publish(place(kind) + ".csv", lambda path: write_table(path, rows, columns))
+        publish(place(kind) + ".svg", lambda path: write_plots(path, kind, rows))
+    if words.kind in ("work", "all"):
+        rows = work(folder, words.repeat, words.set, words.patience)
+        if rows is None:
+            failed.append("work")
+        else:
+            publish(place("work") + ".csv", lambda path: write_table(path, rows, list(rows[0])))
+    if everything and not failed and sum(row["ranks"] >= 4 for row in tables["weak"]) > 2:
+        found = model(tables["weak"], tables["sizes"], rows[0]["per_point_and_step"])
+        publish(place("model") + ".csv", lambda path: write_model(path, found))
+    if failed:
+        sys.exit(f"failed, and no table written: {', '.join(failed)}")
 
 
 if __name__ == "__main__":

@@ -131,16 +131,11 @@ fn summary_says(out: &Path, word: &str) -> bool {
 fn a_refused_chain_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    let of = |path: &Path| {
-        let mut found = contents(path);
-        found.retain(|_, bytes| !bytes.is_empty());
-        found
-    };
     let refused = |out: &Path, deck: &Path, steps: usize, expected: i32| {
-        let before = of(out);
+        let before = contents(out);
         let output = end(start(chain(deck, out, steps, &[])));
         assert_eq!(code(&output), expected, "{}", text(&output));
-        assert!(of(out) == before, "{} was changed", out.display());
+        assert!(contents(out) == before, "{} was changed", out.display());
         assert!(!text(&output).contains("no link follows"), "{}", text(&output));
     };
     let other = folder.path().join("other.toml");
@@ -158,9 +153,7 @@ fn a_refused_chain_changes_nothing() {
     fs::remove_file(stopped.join("summary.json")).unwrap();
     refused(&stopped, &other, 5, 3);
     // Results without a checkpoint.
-    for name in ["checkpoint-000005.h5"] {
-        fs::remove_file(stopped.join(name)).unwrap();
-    }
+    fs::remove_file(stopped.join("checkpoint-000005.h5")).unwrap();
     refused(&stopped, &deck("restart"), 5, 2);
     // A deck that is wrong, and a folder that is not there.
     let output = end(start(chain(&deck("restart"), &at("new"), 5, &["--set", "grid.h=-1"])));
@@ -230,7 +223,7 @@ fn sigterm_ends_a_chain() {
     let said = text(&output);
     assert_eq!(code(&output), 1, "{said}");
     assert!(said.contains("stopped by a signal"), "{said}");
-    assert_eq!(said.matches("asked the run to stop").count(), 1, "{said}");
+    assert_eq!(said.matches("chain: SIGUSR1").count(), 1, "{said}");
     let steps = summary(folder.path())["steps_completed"].as_u64().unwrap() as usize;
     assert_eq!(reached(folder.path()), steps);
     assert_eq!(history(folder.path()).len(), steps);
@@ -329,4 +322,54 @@ fn a_chain_that_breaks_fails() {
     }
     let asked = fs::read_to_string(folder.path().join("asked")).unwrap();
     assert_eq!(asked.matches("sbatch").count(), 2, "the last link submits nothing: {asked}");
+}
+
+fn scaling(kind: &str, out: &Path) -> Command {
+    let mut command = script(&format!("{kind}.sbatch"), &[]);
+    command.env("OUT", out).env("RANKS", "1 2").env("H", "0.5").env("REPEAT", "1");
+    command
+}
+
+/// Both studies into one folder at once: each has its runs and its table. A study that fails says so
+/// and leaves the tables as they were.
+#[test]
+fn scaling_studies_keep_apart_and_fail_aloud() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    let children = ["strong", "weak"].map(|kind| start(scaling(kind, out)));
+    for output in children.map(end) {
+        assert_eq!(code(&output), 0, "{}", text(&output));
+    }
+    let points = |kind: &str| -> Vec<f64> {
+        let path = out.join(format!("scaling-{kind}.csv"));
+        let mut table = csv::Reader::from_path(path).unwrap();
+        let names = table.headers().unwrap().clone();
+        let at = |name: &str| names.iter().position(|other| other == name).unwrap();
+        let (points, linear) = (at("points"), at("linear"));
+        let rows = table.records().map(|row| row.unwrap());
+        rows.filter(|row| &row[linear] != "").map(|row| row[points].parse().unwrap()).collect()
+    };
+    let (strong, weak) = (points("strong"), points("weak"));
+    assert_eq!((strong.len(), weak.len()), (2, 2));
+    assert!(strong[0] == strong[1] && weak[0] < 0.7 * weak[1], "{strong:?} {weak:?}");
+    assert_eq!(strong[1], weak[1]);
+
+    let before: Vec<_> = tables(out);
+    assert_eq!(before.len(), 4, "two tables and their plots");
+    let mut command = scaling("weak", out);
+    command.env("PROGRAM", "/bin/false");
+    let output = end(start(command));
+    assert_eq!(code(&output), 1, "{}", text(&output));
+    assert!(text(&output).contains("no table written: weak"), "{}", text(&output));
+    assert!(tables(out) == before, "a study that failed has changed a table");
+}
+
+fn tables(out: &Path) -> Vec<(String, Vec<u8>)> {
+    let files = fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
+    let mut found: Vec<_> = files
+        .filter(|path| path.is_file())
+        .map(|path| (path.display().to_string(), fs::read(path).unwrap()))
+        .collect();
+    found.sort();
+    found
 }
