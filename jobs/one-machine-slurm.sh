@@ -47,6 +47,7 @@ SlurmctldPidFile=$folder/slurmctld.pid
 SlurmdPidFile=$folder/slurmd.pid
 NodeName=$host NodeAddr=127.0.0.1 CPUs=4 RealMemory=4000
 PartitionName=all Nodes=ALL Default=YES State=UP MaxTime=60
+PartitionName=other Nodes=ALL State=UP MaxTime=60
 CONF
 echo "CgroupAutomount=no" >"$folder/cgroup.conf"
 
@@ -84,10 +85,10 @@ trap 'exit 143' TERM INT HUP
 slurmctld >"$folder/start.log" 2>&1 && slurmd >>"$folder/start.log" 2>&1 ||
     cannot "it does not start: $(tail -n 2 "$folder/start.log")"
 for _ in $(seq 60); do
-    [ "$(sinfo -h -o %T 2>/dev/null)" = idle ] && break
+    [ "$(sinfo -h -p all -o %T 2>/dev/null)" = idle ] && break
     sleep 0.5
 done
-[ "$(sinfo -h -o %T)" = idle ] || cannot "the node does not come up: $(tail -n 2 "$folder/slurmd.log")"
+[ "$(sinfo -h -p all -o %T)" = idle ] || cannot "the node does not come up: $(tail -n 2 "$folder/slurmd.log")"
 # In the background, so that a signal ends the wait at once.
 "$@" &
 wait $!

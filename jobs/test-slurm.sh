@@ -1,7 +1,7 @@
 #!/bin/bash
 # test-slurm.sh FOLDER: under a Slurm (see one-machine-slurm.sh) submits the chain with jobs too
-# short for the run, one of them killed without warning, and the scaling scripts. Exit code 0 if
-# the chain ends with the whole run and the tables are there.
+# short for the run, one of them killed without warning, then a chain and the scaling scripts with
+# srun (MACHINE=slurm). Exit code 0 if the chains end with the whole run and the tables are there.
 set -uo pipefail
 
 folder=$1
@@ -25,7 +25,7 @@ done_in_trial=$(($(wc -l <"$folder/trial/history.csv") - 1))
 steps=${STEPS:-$((done_in_trial * 6 + 60))}
 # Slurm counts whole minutes and looks every half minute: the warning comes at 0 to 30 s. The
 # first link gets none that means anything, and is killed by its time limit.
-export CHAIN_OPTIONS="--time=1 --signal=B:USR1@30 --output=$folder/chain-%j.log"
+export CHAIN_OPTIONS="--signal=B:USR1@30 --output=$folder/chain-%j.log"
 first=$(sbatch --parsable --ntasks=2 --time=1 --signal=B:CONT@10 --output="$folder/chain-%j.log" \
     jobs/chain.sbatch tests/decks/restart.toml "$folder/out" --set "analysis.steps=$steps" \
     --set "output.every=$steps" "${settings[@]}") || fail "sbatch refused the chain"
@@ -64,10 +64,31 @@ echo "chain: killed at row $limited by its time limit, at row $before without wa
     "$(grep -l 'asked the run to stop' "$folder"/chain-*.log | wc -l)"
 wait_for "a link is left" sh -c '[ -z "$(squeue -h)" ]'
 
+# As on a cluster, by srun.
+export MACHINE=slurm
+unset LINKS
+export CHAIN_OPTIONS="--output=$folder/srun-%j.log"
+first=$(sbatch --parsable --ntasks=2 --time=7 --partition=other --account=soil --job-name="a name" \
+    --output="$folder/srun-%j.log" jobs/chain.sbatch tests/decks/restart.toml "$folder/srun" \
+    --set analysis.steps=60 --set output.every=60 "${settings[@]}") || fail "sbatch refused the chain"
+wait_for "no checkpoint of a run by srun" sh -c "ls $folder/srun/checkpoint-*.h5 >/dev/null 2>&1"
+kept=$(squeue -h -o '%i %l %D %P %a %j' | grep -v "^$first ")
+scancel --signal=USR1 --batch "$first"
+completed() { grep -q '^  "status": "completed"' "$folder/srun/summary.json" 2>/dev/null; }
+wait_for "the chain by srun does not end" completed
+[ "${kept#* }" = "7:00 1 other soil a name" ] || fail "the next link asks for: $kept"
+grep -q "chain: SIGUSR1" "$folder/srun-$first.log" || fail "srun did not hand the signal on"
+[ "$(wc -l <"$folder/srun/history.csv")" = 61 ] || fail "the chain by srun is not whole"
+echo "chain by srun: stopped and gone on, with the options of its first job"
+wait_for "a link is left" sh -c '[ -z "$(squeue -h)" ]'
+
 export OUT=$folder/scaling RANKS="1 2" H=0.5
 for kind in strong weak; do
-    sbatch --wait --ntasks=2 --time=5 --output="$folder/$kind.log" jobs/$kind.sbatch >/dev/null ||
-        fail "$kind.sbatch failed"
-    [ -s "$OUT/scaling-$kind.csv" ] && [ -s "$OUT/scaling-$kind.svg" ] || fail "$kind.sbatch left no table"
+    sbatch --wait --ntasks=2 --time=5 --output="$folder/$kind.log" jobs/$kind.sbatch >/dev/null &
+done
+wait
+for kind in strong weak; do
+    [ "$(grep -c ',8,' "$OUT/scaling-$kind.csv")" = 2 ] && [ -s "$OUT/scaling-$kind.svg" ] ||
+        fail "$kind.sbatch left no table"
 done
 echo "scaling: tables written"

@@ -255,7 +255,7 @@ fn stand_in_for_slurm(folder: &Path, sbatch: &str) -> String {
         ("scancel", format!("echo scancel \"$@\" >>{note}")),
         (
             "squeue",
-            "f=$(printf '\\037')\necho \"1-02:00:00${f}3${f}long${f}soil${f}(null)${f}N/A${f}a|b${f}my job\""
+            "f=$(printf '\\037')\necho \"1-02:00:00${f}3${f}long${f}soil${f}(null)${f}N/A${f}a|b${f}NO${f}my job\""
                 .to_string(),
         ),
     ];
@@ -292,6 +292,7 @@ fn a_successor_keeps_the_options() {
         "--partition=long",
         "--account=soil",
         "--constraint=a|b",
+        "--exclusive",
         "--job-name=my job",
         "--cpus-per-task=2",
         "--mem-per-cpu=900",
