@@ -348,7 +348,7 @@ fn scaling_studies_keep_apart_and_fail_aloud() {
         let at = |name: &str| names.iter().position(|other| other == name).unwrap();
         let (points, linear) = (at("points"), at("linear"));
         let rows = table.records().map(|row| row.unwrap());
-        rows.filter(|row| &row[linear] != "").map(|row| row[points].parse().unwrap()).collect()
+        rows.filter(|row| !row[linear].is_empty()).map(|row| row[points].parse().unwrap()).collect()
     };
     let (strong, weak) = (points("strong"), points("weak"));
     assert_eq!((strong.len(), weak.len()), (2, 2));
