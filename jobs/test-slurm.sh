@@ -42,7 +42,7 @@ wait_for() {
     fail "$what"
 }
 wait_for "the first link is not killed by its time limit" \
-    grep -q "DUE TO TIME LIMIT" "$folder/chain-$first.log"
+    grep -qs "DUE TO TIME LIMIT" "$folder/chain-$first.log"
 limited=$(rows)
 # The second: killed with all its processes, without warning, once it has left a checkpoint.
 running() { squeue -h -t R -o %i | grep -v "^$first\$" | head -n 1; }
@@ -51,14 +51,17 @@ reached=$(newest)
 [ -n "$reached" ] || fail "the first link left no checkpoint"
 further() { [ -n "$(running)" ] && [ "$(newest)" -gt "$reached" ]; }
 wait_for "no checkpoint of a second link" further
-scancel --signal=KILL --full "$(running)"
+second=$(running)
 before=$(rows)
+# Not by scancel, which sends SIGTERM before SIGKILL.
+kill -9 $(scontrol listpids "$second" | awk '$1 + 0 > 1 {print $1}')
 # The links after it go on, some stopped by their time limit, to the end.
 ended() { [ "$(status)" = completed ] || [ -z "$(squeue -h)" ]; }
 wait_for "the chain does not end" ended
 [ "$(status)" = completed ] || fail "the chain ended early"
 [ "$before" -lt "$steps" ] || fail "the run was over before it was killed"
 [ "$(rows)" = $((steps + 1)) ] || fail "history.csv has $(rows) rows for $steps steps"
+grep -q "asked the run to stop" "$folder/chain-$second.log" && fail "the second link was warned"
 echo "chain: killed at row $limited by its time limit, at row $before without warning, of" \
     "$steps; links: $(ls "$folder"/chain-*.log | wc -l), stopped by the warning:" \
     "$(grep -l 'asked the run to stop' "$folder"/chain-*.log | wc -l)"
