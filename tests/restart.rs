@@ -137,6 +137,132 @@ fn damaged_checkpoints_are_refused() {
     assert!(contents(&out) == before);
 }
 
+/// Whatever keeps `last` from taking the newest, it says so and takes the one before; what it
+/// passed over stays under another name.
+#[test]
+fn last_passes_over_whatever_it_cannot_take() {
+    let folder = tempfile::tempdir().unwrap();
+    let (good, deck) = (folder.path().join("good"), deck("restart"));
+    let often = ["--set", "output.checkpoint={every=1,keep=9}"];
+    run_well(1, &deck, &good, &often);
+    let sealed = fs::read(good.join("checkpoint-000006.h5")).unwrap();
+    let with_bit = |bytes: &[u8], place: usize| {
+        let mut bytes = bytes.to_vec();
+        bytes[place] ^= 1;
+        bytes
+    };
+    let words = b"yield = 20000";
+    let physics = sealed.windows(words.len()).position(|found| found == words).unwrap();
+    let content = &sealed[..sealed.len() - 48];
+    let other = folder.path().join("other");
+    run_well(1, &deck, &other, &["--set", "material.clay.yield=21e3"]);
+    let foreign = fs::read(other.join("checkpoint-000006.h5")).unwrap();
+    let newer = resealed(content.to_vec(), 77);
+    type Make<'a> = Box<dyn Fn(&Path) + 'a>;
+    let write = |bytes: Vec<u8>| -> Make { Box::new(move |at| fs::write(at, &bytes).unwrap()) };
+    let link = |to: &'static str| -> Make {
+        Box::new(move |at| std::os::unix::fs::symlink(to, at).unwrap())
+    };
+    let full_folder: Make = Box::new(|at| {
+        fs::create_dir(at).unwrap();
+        fs::write(at.join("mine"), "").unwrap();
+    });
+    let cases: [(&str, Make); 8] = [
+        ("No such file", link("absent")),
+        ("symbolic links", link("checkpoint-000006.h5")),
+        ("it is not a file", full_folder),
+        ("is not a readable HDF5 file", write(resealed(with_bit(content, 9), 1))),
+        (
+            "its dataset text.physics is not what was written",
+            write(resealed(with_bit(content, physics + 9), 1)),
+        ),
+        ("its content does not have the checksum", write(with_bit(&sealed, physics))),
+        ("belongs to another problem", write(foreign.clone())),
+        ("written by a newer version", write(newer)),
+    ];
+    for (case, (why, make)) in cases.iter().enumerate() {
+        let ranks = case % 3 + 1;
+        let out = folder.path().join(format!("out-{case}"));
+        copy(&good, &out);
+        let newest = out.join("checkpoint-000006.h5");
+        fs::remove_file(&newest).unwrap();
+        make(&newest);
+        let bytes = fs::read(&newest).ok();
+        let output = run_well(ranks, &deck, &out, &[&often[..], &["--restart", "last"]].concat());
+        let said = text(&output);
+        let warning = said.lines().find(|line| line.contains(why));
+        let warning = warning.unwrap_or_else(|| panic!("{why}? {said}"));
+        assert!(warning.starts_with("warning: "), "{said}");
+        assert!(warning.contains("checkpoint-000006.h5"), "{said}");
+        let taken = format!("falling back to {}", out.join("checkpoint-000005.h5").display());
+        assert!(said.contains(&taken), "{said}");
+        assert_eq!(column(&out, "step"), [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(fs::metadata(&newest).unwrap().len(), sealed.len() as u64, "written anew");
+        let aside = out.join("checkpoint-000006.h5.passed-over");
+        assert!(fs::symlink_metadata(&aside).is_ok(), "{why}: it is gone");
+        assert_eq!(fs::read(&aside).ok(), bytes, "{why}: it was changed");
+    }
+
+    // Older ones do not help: every reason is said, nothing is changed.
+    for step in 1..5 {
+        fs::remove_file(good.join(format!("checkpoint-{step:06}.h5"))).unwrap();
+    }
+    fs::write(good.join("checkpoint-000006.h5"), &foreign).unwrap();
+    fs::write(good.join("checkpoint-000005.h5"), "").unwrap();
+    let before = contents(&good);
+    for ranks in [1, 2, 3] {
+        let output = run(ranks, &deck, &good, &["--restart", "last"]);
+        let said = text(&output);
+        assert_eq!(output.status.code(), Some(3), "{said}");
+        assert!(said.contains("checkpoint-000006.h5 belongs to another problem"), "{said}");
+        assert!(said.contains("checkpoint-000005.h5 is damaged"), "{said}");
+        assert_eq!(said.matches("error:").count(), 1, "{said}");
+        assert!(contents(&good) == before);
+    }
+}
+
+/// Content with a seal of this format that belongs to it.
+fn resealed(content: Vec<u8>, format: u64) -> Vec<u8> {
+    let blocks = content.chunks(1 << 20).enumerate().map(|(block, bytes)| {
+        let mut sum = Checksum::new(block as u64);
+        sum.add_bytes(bytes);
+        sum.finish()
+    });
+    let sum = blocks.fold(0, u64::wrapping_add);
+    let mut seal = b"mpm-par-restart\n".to_vec();
+    for number in [format, content.len() as u64, sum] {
+        seal.extend(number.to_le_bytes());
+    }
+    let mut own = Checksum::new(1);
+    own.add_bytes(&seal);
+    [content, seal, own.finish().to_le_bytes().to_vec()].concat()
+}
+
+/// Checkpoints come when their time has come, and the newest `keep` stay.
+#[test]
+fn checkpoints_come_by_the_clock_and_the_newest_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = deck("restart");
+    let cases = [
+        // However short a step, more time than this has passed.
+        ("minutes=1e-9,keep=3", 6, &[4, 5, 6][..]),
+        ("minutes=1e-9,every=3,keep=1", 6, &[6]),
+        ("minutes=1e9,every=2,keep=2", 3, &[4, 6]),
+        ("minutes=1e9", 0, &[]),
+    ];
+    for (case, (plan, written, left)) in cases.into_iter().enumerate() {
+        for ranks in [1, 2] {
+            let out = folder.path().join(format!("{case}-{ranks}"));
+            run_well(ranks, &deck, &out, &["--set", &format!("output.checkpoint={{{plan}}}")]);
+            let log = fs::read_to_string(out.join("log.txt")).unwrap();
+            assert_eq!(log.matches("checkpoint: ").count(), written, "{plan}\n{log}");
+            let names = contents(&out).into_keys().filter(|name| name.starts_with("checkpoint-"));
+            let expected: Vec<_> = left.iter().map(|n| format!("checkpoint-{n:06}.h5")).collect();
+            assert_eq!(names.collect::<Vec<_>>(), expected, "{plan}");
+        }
+    }
+}
+
 /// Another problem, another format, no file at all: exit code 3 on all of them.
 #[test]
 fn foreign_newer_and_missing_checkpoints_are_refused() {
@@ -166,12 +292,8 @@ fn foreign_newer_and_missing_checkpoints_are_refused() {
     assert!(!Path::new(&empty).exists(), "a refusal creates nothing");
 
     // A format from the future, sealed as it should be.
-    let mut bytes = fs::read(&newest).unwrap();
-    let seal = bytes.len() - 48;
-    bytes[seal + 16..seal + 24].copy_from_slice(&77_u64.to_le_bytes());
-    let mut sum = Checksum::new(1);
-    sum.add_bytes(&bytes[seal..seal + 40]);
-    bytes.splice(seal + 40.., sum.finish().to_le_bytes());
+    let sealed = fs::read(&newest).unwrap();
+    let bytes = resealed(sealed[..sealed.len() - 48].to_vec(), 77);
     let newer = folder.path().join("newer.h5");
     fs::write(&newer, &bytes).unwrap();
     refuse(&["--restart", &newer.display().to_string()], "newer version of the program (format 77");

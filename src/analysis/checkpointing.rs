@@ -14,10 +14,10 @@ use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
 use crate::output::agreement::on_root;
 use crate::output::checkpoint::{self, Checkpoint, Refusal, Restored};
-use crate::output::directory::SUPERSEDED;
+use crate::output::directory::{PASSED_OVER, SUPERSEDED};
 use crate::output::log::Log;
 use crate::output::seal::checksum_of_bytes;
-use crate::output::whole_file::{cannot_read, cannot_write};
+use crate::output::whole_file::{cannot_read, cannot_write, sync_names};
 use crate::output::{ResultsDirectory, RunState};
 use crate::parallel::World;
 use crate::parallel::signals::{self, Signal};
@@ -89,7 +89,8 @@ impl Checkpointer {
         .write(&path, world.comm())?;
         self.last = Instant::now();
         on_root(world.comm(), || {
-            let known = checkpoints_in(&self.directory)?;
+            let mut known = checkpoints_in(&self.directory)?;
+            known.retain(|(_, path)| !is_folder(path));
             let excess = known.len().saturating_sub(self.plan.keep);
             for (_, old) in &known[..excess] {
                 fs::remove_file(old).map_err(|reason| cannot_write(old, &reason))?;
@@ -127,8 +128,8 @@ pub fn physics_of(world: &World, deck: &Deck) -> Result<String> {
 }
 
 /// Finds and reads the checkpoint that `--restart` names. `last`: the newest good one in the
-/// results directory; damaged ones are passed over with a word about it. Nothing is written.
-/// Collective. Errors: exit code 3.
+/// results directory; others (damaged, not to be read, of another problem or a newer format) are
+/// passed over with a word about it. Nothing is written. Collective. Errors: exit code 3.
 pub fn find<const D: usize>(
     world: &World,
     physics: &str,
@@ -141,43 +142,47 @@ pub fn find<const D: usize>(
         Restart::File(path) => vec![path.clone()],
         Restart::Last => listed(world, out)?,
     };
-    let mut damaged = Vec::new();
+    let mut refused = Vec::new();
     for path in &candidates {
-        match checkpoint::read::<D>(path, physics, comm)? {
+        match checkpoint::read::<D>(path, physics, comm) {
             Ok(restored) => {
-                for text in &damaged {
+                for (_, text) in &refused {
                     log.say(&format!("warning: {text}"));
                 }
-                if !damaged.is_empty() {
+                if !refused.is_empty() {
                     log.say(&format!("warning: falling back to {}", path.display()));
                 }
                 return Ok(restored);
             }
-            Err(refusal @ Refusal::Damaged(_)) => damaged.push(refusal.describe(path)),
-            Err(refusal) => return Err(Error::File(error_text(&refusal.describe(path)))),
+            Err(refusal) => {
+                let text = refusal.describe(path);
+                refused.push((refusal, text));
+            }
         }
     }
-    Err(Error::File(error_text(&match (choice, damaged.is_empty()) {
-        (Restart::File(_), _) => format!(
-            "{}\n    try: --restart last, which takes the newest good checkpoint of {}",
-            damaged.join("\n"),
+    let reasons: Vec<&str> = refused.iter().map(|(_, text)| text.as_str()).collect();
+    let reasons = reasons.join("\n");
+    let bad = |refusal: &Refusal| matches!(refusal, Refusal::Damaged(_) | Refusal::Unreadable(_));
+    Err(Error::File(error_text(&match (choice, refused.is_empty()) {
+        (Restart::File(_), _) if refused.iter().any(|(refusal, _)| bad(refusal)) => format!(
+            "{reasons}\n    try: --restart last, which takes the newest good checkpoint of {}",
             out.display()
         ),
+        (Restart::File(_), _) => reasons,
         (Restart::Last, true) => format!(
             "--restart last: {} holds no checkpoint\n    try: output.checkpoint = {{ every = 10 }} \
              in the deck, and a run without --restart",
             out.display()
         ),
         (Restart::Last, false) => format!(
-            "--restart last: no checkpoint in {} is good:\n{}",
-            out.display(),
-            damaged.join("\n")
+            "--restart last: no checkpoint in {} can be continued:\n{reasons}",
+            out.display()
         ),
     })))
 }
 
 fn error_text(text: &str) -> String {
-    format!("error: {text}\nnothing was changed")
+    format!("{text}\nnothing was changed")
 }
 
 /// What helps when results could not be written. Collective.
@@ -204,18 +209,31 @@ pub fn lies_in(world: &World, checkpoint: &Path, out: &Path) -> bool {
     world.any(world.is_root() && same().unwrap_or(false))
 }
 
-/// Renames checkpoints of later steps than the one continued from: they belong to a course of
-/// the run that is given up, and `last` must not find them. The next checkpoint removes them.
-pub fn set_later_aside(world: &World, out: &Path, used: &Path, step: usize) -> Result<()> {
+/// Renames checkpoints of later steps than the one continued from. After a named file they belong
+/// to a course of the run that is given up, and the next checkpoint removes them. Those that `last`
+/// has passed over may be worth something to somebody: they stay under their new name.
+pub fn set_later_aside(
+    world: &World,
+    out: &Path,
+    choice: &Restart,
+    used: &Path,
+    step: usize,
+) -> Result<()> {
+    let ending = match choice {
+        Restart::File(_) => SUPERSEDED,
+        Restart::Last => PASSED_OVER,
+    };
     on_root(world.comm(), || {
         let used = used.file_name();
         for (_, path) in checkpoints_in(out)?.into_iter().filter(|(number, _)| *number > step) {
             if path.file_name() != used {
                 let mut aside = path.clone().into_os_string();
-                aside.push(SUPERSEDED);
+                aside.push(ending);
                 fs::rename(&path, aside).map_err(|reason| cannot_write(&path, &reason))?;
             }
         }
+        // Before the tables are cut: a checkpoint of rows that are gone must not come back.
+        sync_names(out);
         Ok(())
     })
 }
@@ -254,7 +272,13 @@ fn checkpoints_in(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
 fn superseded_in(folder: &Path) -> Result<Vec<PathBuf>> {
     let names = entries(folder)?;
     let ours = |name: &String| name.starts_with("checkpoint-") && name.ends_with(SUPERSEDED);
-    Ok(names.into_iter().filter(ours).map(|name| folder.join(name)).collect())
+    let paths = names.into_iter().filter(ours).map(|name| folder.join(name));
+    Ok(paths.filter(|path| !is_folder(path)).collect())
+}
+
+/// Has the name of a checkpoint, and is none.
+fn is_folder(path: &Path) -> bool {
+    fs::symlink_metadata(path).is_ok_and(|found| found.is_dir())
 }
 
 fn entries(folder: &Path) -> Result<Vec<String>> {

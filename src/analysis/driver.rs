@@ -11,11 +11,11 @@ use crate::cli::{self, Arguments};
 use crate::deck::model::AnalysisType;
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
-use crate::output::ResultsDirectory;
 use crate::output::log::Log;
 use crate::output::report::{self, Banner, Failure};
 use crate::output::start;
 use crate::output::summary::Status;
+use crate::output::{ResultsDirectory, RunLock};
 use crate::parallel::{World, signals};
 use crate::petsc::known;
 use crate::petsc::log::Stages;
@@ -125,23 +125,29 @@ impl Run<'_> {
         let mut clock = Clock::new(Some(Stages::register()?));
         let resolved = deck::resolved(&deck);
         let physics = checkpointing::physics_of(world, &deck)?;
+        let (out, comm) = (&self.arguments.out, world.comm());
+        let mut lock = RunLock::of(out);
+        if !self.arguments.check {
+            // Before a checkpoint is chosen: the run that has the directory may be writing one.
+            lock.take(false, &mut self.log, comm)?;
+        }
         let (mut model, mut points, resume) = match &self.arguments.restart {
             None => {
                 let (model, points) = setup::prepare::<D>(world, deck)?;
                 (model, points, None)
             }
             Some(choice) => {
-                let out = &self.arguments.out;
                 let found = checkpointing::find::<D>(world, &physics, choice, out, &mut self.log)?;
                 self.log.say(&report::restart(&found.path, found.step, found.ranks, world.size()));
                 let resume = Resume {
                     state: found.state.clone(),
+                    checkpoint: found.path.clone(),
+                    step: found.step,
                     same_directory: checkpointing::lies_in(world, &found.path, out),
                 };
-                let (used, step) = (found.path.clone(), found.step);
                 let (mut model, points) = setup::restore(world, deck, found)?;
                 model.balance.restore(&resume.state)?;
-                (model, points, Some((resume, used, step)))
+                (model, points, Some(resume))
             }
         };
         let active = discretise::active(world, &model, &points)?;
@@ -155,23 +161,24 @@ impl Run<'_> {
             self.log.say("The deck is good; nothing was run (--check).");
             return Ok(());
         }
-        let (out, comm) = (&self.arguments.out, world.comm());
-        let goes_on = resume.as_ref().filter(|(resume, ..)| resume.same_directory);
-        let directory = match goes_on {
-            Some((_, used, step)) => {
-                let directory = ResultsDirectory::reopen(out, comm)?;
-                checkpointing::set_later_aside(world, out, used, *step)?;
-                directory
-            }
+        lock.take(true, &mut self.log, comm)?;
+        let earlier = resume.as_ref().filter(|resume| resume.same_directory);
+        let earlier = earlier.map(|resume| (resume.checkpoint.clone(), resume.step));
+        let directory = match earlier {
+            Some(_) => ResultsDirectory::reopen(out, comm)?,
             None => ResultsDirectory::create(out, self.arguments.force, comm)?,
         };
-        directory.write_decks(&self.text, &resolved, comm)?;
-        self.log.attach(&directory, goes_on.is_some(), comm)?;
         let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
-        let resume = resume.map(|(resume, ..)| resume);
-        let (log, versions) = (self.log, self.versions);
+        let (log, versions, into) = (self.log, self.versions, directory.clone());
         let mut recorder =
-            Recorder::create(world, &model.deck, directory, log, versions, checkpointer, resume)?;
+            Recorder::create(world, &model.deck, into, log, versions, checkpointer, resume)?;
+        // All of the earlier part is known to fit: now it may be changed.
+        if let (Some((used, step)), Some(choice)) = (earlier, &self.arguments.restart) {
+            checkpointing::set_later_aside(world, out, choice, &used, step)?;
+            directory.leave_earlier_part(comm)?;
+        }
+        directory.write_decks(&self.text, &resolved, comm)?;
+        recorder.open(world)?;
         signals::listen();
         process::before_steps();
         clock.end_setup();

@@ -7,6 +7,7 @@ use crate::assembly::Numbering;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every};
 use crate::error::{Error, Result};
+use crate::output::csv_table::Mark;
 use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::history::{HistoryRow, Layout};
 use crate::output::log::Log;
@@ -51,6 +52,8 @@ pub struct Recorder {
     balance: BalanceReport,
     checkpointer: Checkpointer,
     resumed: Option<RunState>,
+    /// [`Resume::same_directory`]; false without a restart.
+    same_directory: bool,
     /// s that earlier parts of the run took.
     earlier_seconds: f64,
     /// s up to the last row, earlier parts included.
@@ -60,6 +63,9 @@ pub struct Recorder {
 /// What a restart hands to the recorder.
 pub struct Resume {
     pub state: RunState,
+    /// Where it was read, and the step at whose end it was written.
+    pub checkpoint: PathBuf,
+    pub step: usize,
     /// The results directory is that of the earlier part: its tables and series go on.
     pub same_directory: bool,
 }
@@ -89,12 +95,13 @@ impl Ending {
 }
 
 impl Recorder {
-    /// Opens the files in a results directory: fresh ones, or those of the run that is resumed.
+    /// The files of a results directory: fresh ones, or those of the run that is resumed, which are
+    /// read and tested. Nothing is written before [`Self::open`].
     pub fn create(
         world: &World,
         deck: &Deck,
         directory: ResultsDirectory,
-        log: Log,
+        mut log: Log,
         versions: BTreeMap<String, String>,
         checkpointer: Checkpointer,
         resume: Option<Resume>,
@@ -110,22 +117,30 @@ impl Recorder {
         let goes_on = resume.as_ref().filter(|resume| resume.same_directory);
         let (history, residuals, points, grid) = match goes_on {
             None => (
-                History::create(&directory, layout, comm)?,
-                Residuals::create(&directory, comm)?,
+                History::create(&directory, layout)?,
+                Residuals::create(&directory)?,
                 PointsSeries::create(&directory, &fields, basis, dimension),
                 GridSeries::create(&directory),
             ),
             Some(Resume { state, .. }) => {
                 let count = |name: &str| state.count(name).map(|n| n as usize);
                 let step = count("recorder.steps")?;
+                let mark = |table: &str| -> Result<Mark> {
+                    let rows = count(&format!("recorder.{table}_rows"))?;
+                    // Not known to the first checkpoints of this format.
+                    let step = count(&format!("recorder.{table}_step")).unwrap_or(usize::MAX);
+                    Ok(Mark { rows, step })
+                };
+                let (history, residuals) = (mark("history")?, mark("residual")?);
                 (
-                    History::resume(&directory, layout, count("recorder.history_rows")?, comm)?,
-                    Residuals::resume(&directory, count("recorder.residual_rows")?, comm)?,
+                    History::resume(&directory, layout, history, &mut log, comm)?,
+                    Residuals::resume(&directory, residuals, &mut log, comm)?,
                     PointsSeries::resume(&directory, &fields, basis, dimension, step, comm)?,
                     GridSeries::resume(&directory, step, comm)?,
                 )
             }
         };
+        let same_directory = goes_on.is_some();
         let mut recorder = Recorder {
             log,
             history,
@@ -149,6 +164,7 @@ impl Recorder {
             balance: BalanceReport::default(),
             checkpointer,
             resumed: None,
+            same_directory,
             earlier_seconds: 0.0,
             seconds: 0.0,
         };
@@ -157,6 +173,17 @@ impl Recorder {
             recorder.resumed = Some(state);
         }
         Ok(recorder)
+    }
+
+    /// Opens the tables. Those of a run that is resumed, and its series, lose what came later: the
+    /// series first, as whoever looks at them looks for the newest frame.
+    pub fn open(&mut self, world: &World) -> Result<()> {
+        let comm = world.comm();
+        self.log.attach(&self.directory, self.same_directory, comm)?;
+        self.points.cut(comm)?;
+        self.grid.cut(comm)?;
+        self.history.open(comm)?;
+        self.residuals.open(comm)
     }
 
     /// What the time loop saved with [`Self::end_step`] before the run was interrupted; `None`
@@ -231,6 +258,9 @@ impl Recorder {
     ) -> Result<()> {
         self.save(&mut state);
         model.balance.save(&mut state);
+        // A checkpoint counts on its rows: they are to outlast a power cut if it does.
+        self.history.sync(world.comm())?;
+        self.residuals.sync(world.comm())?;
         let step = self.steps_completed;
         let path = self.checkpointer.write(world, step, model, points, &state)?;
         self.log.note(&format!("checkpoint: {}", path.display()));
@@ -240,8 +270,10 @@ impl Recorder {
     fn save(&self, state: &mut RunState) {
         for (name, value) in [
             ("recorder.steps", self.steps_completed),
-            ("recorder.history_rows", self.history.rows()),
-            ("recorder.residual_rows", self.residuals.rows()),
+            ("recorder.history_rows", self.history.mark().rows),
+            ("recorder.history_step", self.history.mark().step),
+            ("recorder.residual_rows", self.residuals.mark().rows),
+            ("recorder.residual_step", self.residuals.mark().step),
             ("recorder.newton_total", self.newton.total),
             ("recorder.newton_max", self.newton.max),
             ("recorder.linear_total", self.linear.total),

@@ -22,6 +22,7 @@ use super::hdf5_reader::FileReader;
 use super::hdf5_writer::{FileWriter, Plain};
 use super::run_state::RunState;
 use super::seal::{self, Checksum, Flaw, checksum_of, wrapping_sum};
+use super::whole_file::sync_names;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::Points;
@@ -104,44 +105,44 @@ impl<const D: usize> Checkpoint<'_, D> {
         seal::seal(&partial, FORMAT, comm)?;
         on_root(comm, || {
             partial.give_name()?;
-            // The name itself must reach the disk too; not every file system can be told so.
-            if let Some(folder) = path.parent().and_then(|folder| std::fs::File::open(folder).ok())
-            {
-                let _ = folder.sync_all();
+            if let Some(folder) = path.parent() {
+                sync_names(folder);
             }
             Ok(())
         })
     }
 }
 
-/// Reads a checkpoint of the problem `physics`. The inner error says why the file cannot be
-/// taken. Collective.
+/// Reads a checkpoint of the problem `physics`; whatever is wrong is a reason not to take this
+/// file, and says nothing about others. Collective, the same outcome on all ranks.
 pub fn read<const D: usize>(
     path: &Path,
     physics: &str,
     comm: &SimpleCommunicator,
-) -> Result<std::result::Result<Restored<D>, Refusal>> {
-    if let Err(flaw) = seal::test(path, FORMAT, comm)? {
-        return Ok(Err(flaw.into()));
+) -> std::result::Result<Restored<D>, Refusal> {
+    match seal::test(path, FORMAT, comm) {
+        Ok(Ok(_)) => {}
+        Ok(Err(flaw)) => return Err(flaw.into()),
+        Err(why) => return Err(Refusal::Unreadable(why.to_string())),
     }
-    let input = Reader { file: FileReader::open(path, comm)?, comm, sums: Vec::new() };
-    let sums = input.file.read_all::<u64>("sums")?;
-    let input = Reader { sums: sums.chunks_exact(2).map(|s| (s[0], s[1])).collect(), ..input };
-    let own = input.text("text.physics")?;
+    // Sealed, and yet not what was in memory when it was written.
+    let damaged = |why: Error| Refusal::Damaged(why.to_string());
+    let file = FileReader::open(path, comm).map_err(damaged)?;
+    let sums = file.read_all::<u64>("sums").map_err(damaged)?;
+    let sums = sums.chunks_exact(2).map(|s| (s[0], s[1])).collect();
+    let input = Reader { file, comm, sums };
+    let own = input.text("text.physics").map_err(damaged)?;
     if own != physics {
-        return Ok(Err(Refusal::Foreign(foreign(&own, physics))));
+        return Err(Refusal::Foreign(foreign(&own, physics)));
     }
-    match content(&input, path) {
-        Ok(restored) => Ok(Ok(restored)),
-        // Sealed, and yet not what was in memory when it was written.
-        Err(Error::File(text)) => Ok(Err(Refusal::Damaged(text))),
-        Err(error) => Err(error),
-    }
+    content(&input, path).map_err(damaged)
 }
 
 /// Why a checkpoint is not taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Refusal {
+    /// The system does not give it; the text names the file.
+    Unreadable(String),
     Damaged(String),
     Newer(u64),
     /// Of another problem; the text says in what they differ.
@@ -162,6 +163,7 @@ impl Refusal {
     pub fn describe(&self, path: &Path) -> String {
         let path = path.display();
         match self {
+            Refusal::Unreadable(why) => why.clone(),
             Refusal::Damaged(why) => format!("{path} is damaged and cannot be continued: {why}"),
             Refusal::Newer(format) => format!(
                 "{path} was written by a newer version of the program (format {format}; this one \

@@ -19,6 +19,8 @@ pub const RESOLVED_DECK: &str = "resolved.toml";
 
 /// Ending of a checkpoint that a restart from an earlier one has made void.
 pub const SUPERSEDED: &str = ".superseded";
+/// Ending of a checkpoint that `--restart last` could not take: not this run's to remove.
+pub const PASSED_OVER: &str = ".passed-over";
 
 /// All names that a run may leave, apart from the numbered ones.
 const NAMES: [&str; 9] = [
@@ -62,6 +64,16 @@ impl ResultsDirectory {
         Ok(Self { path: path.to_path_buf() })
     }
 
+    /// Removes what would be wrong as soon as a continued run changes its tables: the summary of
+    /// the earlier part, and files that it had not finished. A directory without a summary is that
+    /// of a run that goes on, or was killed.
+    pub fn leave_earlier_part(&self, comm: &SimpleCommunicator) -> Result<()> {
+        on_root(comm, || {
+            let names = results_in(&self.path)?;
+            remove(&self.path, names.iter().filter(|n| *n == SUMMARY || n.ends_with(PARTIAL)))
+        })
+    }
+
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -84,10 +96,15 @@ impl ResultsDirectory {
     }
 }
 
-fn prepare(path: &Path, force: bool) -> Result<()> {
+/// Creates a directory with all those above it.
+pub fn make_folder(path: &Path) -> Result<()> {
     fs::create_dir_all(path).map_err(|reason| {
         Error::File(format!("cannot create the results directory {}: {reason}", path.display()))
-    })?;
+    })
+}
+
+fn prepare(path: &Path, force: bool) -> Result<()> {
+    make_folder(path)?;
     let old = results_in(path)?;
     if !old.is_empty() && !force {
         return Err(Error::Input(format!(
@@ -99,8 +116,12 @@ fn prepare(path: &Path, force: bool) -> Result<()> {
         )));
     }
     probe(path)?;
-    for name in old {
-        let file = path.join(name);
+    remove(path, old.iter())
+}
+
+fn remove<'a>(folder: &Path, names: impl Iterator<Item = &'a String>) -> Result<()> {
+    for name in names {
+        let file = folder.join(name);
         fs::remove_file(&file).map_err(|reason| {
             Error::File(format!("cannot remove the old {}: {reason}", file.display()))
         })?;
@@ -125,7 +146,8 @@ fn results_in(path: &Path) -> Result<Vec<String>> {
 }
 
 fn is_ours(name: &str) -> bool {
-    let name = name.strip_suffix(PARTIAL).or(name.strip_suffix(SUPERSEDED)).unwrap_or(name);
+    let endings = [PARTIAL, SUPERSEDED, PASSED_OVER];
+    let name = endings.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name);
     NAMES.contains(&name)
         || NUMBERED.iter().any(|prefix| {
             name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(".h5")).is_some_and(
@@ -156,11 +178,19 @@ mod tests {
             "grid-000000.h5.partial",
             "checkpoint-12.h5",
             "checkpoint-000012.h5.superseded",
+            "checkpoint-000012.h5.passed-over",
             "points.xdmf.partial",
         ] {
             assert!(is_ours(name), "{name}");
         }
-        for name in ["points-.h5", "points-a.h5", "my-points-000005.h5", "notes.txt", "grid.h5"] {
+        for name in [
+            "points-.h5",
+            "points-a.h5",
+            "my-points-000005.h5",
+            "notes.txt",
+            "grid.h5",
+            ".mpm-par.lock",
+        ] {
             assert!(!is_ours(name), "{name}");
         }
     }

@@ -55,7 +55,8 @@ impl GridSeries {
         Self { directory: directory.clone(), series }
     }
 
-    /// Continues the series of a run that is restarted after `last_step`.
+    /// Continues the series of a run that is restarted after `last_step`. Nothing is written before
+    /// [`Self::cut`].
     pub fn resume(
         directory: &ResultsDirectory,
         last_step: usize,
@@ -63,6 +64,11 @@ impl GridSeries {
     ) -> Result<Self> {
         let series = XdmfSeries::resume(&directory.file("grid.xdmf"), last_step, comm)?;
         Ok(Self { directory: directory.clone(), series })
+    }
+
+    /// [`XdmfSeries::cut`]
+    pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        self.series.cut(comm)
     }
 
     /// Writes the active grid of `step`. `time` is in s, or the load factor.

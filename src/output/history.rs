@@ -2,8 +2,9 @@
 
 use mpi::topology::SimpleCommunicator;
 
-use super::csv_table::CsvTable;
+use super::csv_table::{CsvTable, Mark};
 use super::directory::{HISTORY, ResultsDirectory};
+use super::log::Log;
 use crate::error::Result;
 
 /// What a run's history holds besides the columns that every run has.
@@ -153,30 +154,38 @@ pub struct History {
 }
 
 impl History {
-    pub fn create(
-        directory: &ResultsDirectory,
-        layout: Layout,
-        comm: &SimpleCommunicator,
-    ) -> Result<Self> {
-        let table = CsvTable::create(&directory.file(HISTORY), &header(&layout), comm)?;
+    /// A new history. Nothing is written before [`Self::open`].
+    pub fn create(directory: &ResultsDirectory, layout: Layout) -> Result<Self> {
+        let table = CsvTable::create(&directory.file(HISTORY), &header(&layout))?;
         Ok(Self { layout, table })
     }
 
-    /// Continues the history of a run after its first `rows` rows.
+    /// Continues the history of a run up to `mark`: [`CsvTable::resume`].
     pub fn resume(
         directory: &ResultsDirectory,
         layout: Layout,
-        rows: usize,
+        mark: Mark,
+        log: &mut Log,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let path = directory.file(HISTORY);
-        let table = CsvTable::resume(&path, &header(&layout), rows, comm)?;
+        let table = CsvTable::resume(&path, &header(&layout), mark, log, comm)?;
         Ok(Self { layout, table })
     }
 
-    /// Rows of the whole run so far.
-    pub fn rows(&self) -> usize {
-        self.table.rows()
+    /// [`CsvTable::open`]
+    pub fn open(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        self.table.open(comm)
+    }
+
+    /// [`CsvTable::sync`]
+    pub fn sync(&self, comm: &SimpleCommunicator) -> Result<()> {
+        self.table.sync(comm)
+    }
+
+    /// [`CsvTable::mark`]
+    pub fn mark(&self) -> Mark {
+        self.table.mark()
     }
 
     /// Appends a row; it is on its way to the disk when this returns.

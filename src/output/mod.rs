@@ -16,6 +16,7 @@
 //! | the names and formulas of the point fields | `point_field.rs` |
 //! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
 //! | what writing asks of the process before MPI starts | `start.rs` |
+//! | one run at a time in a directory | `run_lock.rs` |
 //! | XDMF time series | `xdmf.rs` |
 //! | text of the banner, the plan, the steps, the closing table, a failure | `report.rs`, `progress.rs` |
 //! | one rank acts, every rank learns the outcome | `agreement.rs` |
@@ -41,6 +42,7 @@ pub mod points_file;
 pub mod progress;
 pub mod report;
 pub mod residuals;
+pub mod run_lock;
 pub mod run_state;
 pub mod seal;
 pub mod start;
@@ -61,5 +63,6 @@ pub use point_field::{PointField, Quantity};
 pub use points_file::PointsSeries;
 pub use progress::Progress;
 pub use residuals::Residuals;
+pub use run_lock::RunLock;
 pub use run_state::RunState;
 pub use summary::Summary;

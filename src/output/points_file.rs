@@ -42,7 +42,8 @@ impl PointsSeries {
         }
     }
 
-    /// Continues the series of a run that is restarted after `last_step`.
+    /// Continues the series of a run that is restarted after `last_step`. Nothing is written before
+    /// [`Self::cut`].
     pub fn resume(
         directory: &ResultsDirectory,
         fields: &[PointField],
@@ -57,6 +58,12 @@ impl PointsSeries {
             *series = XdmfSeries::resume(&directory.file("domains.xdmf"), last_step, comm)?;
         }
         Ok(this)
+    }
+
+    /// [`XdmfSeries::cut`]
+    pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        self.points.cut(comm)?;
+        self.domains.as_mut().map_or(Ok(()), |series| series.cut(comm))
     }
 
     /// Writes all points at the end of `step`. `time` is in s, or the load factor.

@@ -2,8 +2,9 @@
 
 use mpi::topology::SimpleCommunicator;
 
-use super::csv_table::CsvTable;
+use super::csv_table::{CsvTable, Mark};
 use super::directory::{RESIDUALS, ResultsDirectory};
+use super::log::Log;
 use crate::error::Result;
 
 /// The open list of residuals.
@@ -13,28 +14,39 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    pub fn create(directory: &ResultsDirectory, comm: &SimpleCommunicator) -> Result<Self> {
-        let table = CsvTable::create(&directory.file(RESIDUALS), &header(), comm)?;
-        Ok(Self { table })
+    /// A new list. Nothing is written before [`Self::open`].
+    pub fn create(directory: &ResultsDirectory) -> Result<Self> {
+        Ok(Self { table: CsvTable::create(&directory.file(RESIDUALS), &header())? })
     }
 
-    /// Continues the list of a run after its first `rows` rows.
+    /// Continues the list of a run up to `mark`: [`CsvTable::resume`].
     pub fn resume(
         directory: &ResultsDirectory,
-        rows: usize,
+        mark: Mark,
+        log: &mut Log,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let path = directory.file(RESIDUALS);
-        Ok(Self { table: CsvTable::resume(&path, &header(), rows, comm)? })
+        Ok(Self { table: CsvTable::resume(&path, &header(), mark, log, comm)? })
     }
 
-    /// Rows of the whole run so far.
-    pub fn rows(&self) -> usize {
-        self.table.rows()
+    /// [`CsvTable::open`]
+    pub fn open(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        self.table.open(comm)
     }
 
-    /// Appends the residuals of one step; the first belongs to iteration 0, at zero displacement. A step that failed
-    /// and is tried again writes its iterations again.
+    /// [`CsvTable::sync`]
+    pub fn sync(&self, comm: &SimpleCommunicator) -> Result<()> {
+        self.table.sync(comm)
+    }
+
+    /// [`CsvTable::mark`]
+    pub fn mark(&self) -> Mark {
+        self.table.mark()
+    }
+
+    /// Appends the residuals of one step; the first belongs to iteration 0, at zero displacement.
+    /// A step that failed and is tried again writes its iterations again.
     pub fn push_step(
         &mut self,
         step: usize,

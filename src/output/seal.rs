@@ -142,6 +142,10 @@ fn seal_bytes(format: u64, length: u64, checksum: u64) -> Vec<u8> {
 
 /// 1, format, length and checksum; zeros without a whole seal that fits the file.
 fn read_seal(path: &Path) -> std::io::Result<[u64; 4]> {
+    // Asked before: to open what is no file may take for ever.
+    if !std::fs::metadata(path)?.is_file() {
+        return Err(std::io::Error::other("it is not a file"));
+    }
     let mut file = File::open(path)?;
     let size = file.metadata()?.len();
     let Some(length) = size.checked_sub(SEAL_BYTES as u64) else { return Ok([0; 4]) };

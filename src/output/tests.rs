@@ -7,6 +7,7 @@ use std::process::{Command, Stdio};
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::agreement::{all_agree, on_root};
+use super::csv_table::Mark;
 use super::extent::body_summaries;
 use super::history::{HistoryRow, Layout, Reaction};
 use super::*;
@@ -121,6 +122,7 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
     }
     // A restart after step 0 forgets step 5 and writes it again.
     let mut series = PointsSeries::resume(&directory, PointField::ALL, basis, D, 0, comm).unwrap();
+    series.cut(comm).unwrap();
     series.write(5, 0.5, &points, comm).unwrap();
 
     let bodies = body_summaries(&points, 3, basis, comm);
@@ -220,14 +222,22 @@ fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
         reactions: vec![Reaction { force: [1.5, 0.0, 0.0], ..Default::default() }],
         ..Default::default()
     };
-    let mut history = History::create(&directory, layout(), comm).unwrap();
-    let mut residuals = Residuals::create(&directory, comm).unwrap();
+    let mut history = History::create(&directory, layout()).unwrap();
+    let mut residuals = Residuals::create(&directory).unwrap();
+    assert!(!folder.join("history.csv").exists(), "written before it was opened");
+    assert_eq!(history.push(&row(1), comm).unwrap_err().exit_code(), 3);
+    history.open(comm).unwrap();
+    residuals.open(comm).unwrap();
     for step in 1..=4 {
         history.push(&row(step), comm).unwrap();
         residuals.push_step(step, &[1.0, 1e-10], comm).unwrap();
     }
-    let mut history = History::resume(&directory, layout(), 2, comm).unwrap();
-    let mut residuals = Residuals::resume(&directory, 4, comm).unwrap();
+    let mark = Mark { rows: 2, step: 2 };
+    let mut history = History::resume(&directory, layout(), mark, &mut log, comm).unwrap();
+    let mark = Mark { rows: 4, step: 2 };
+    let mut residuals = Residuals::resume(&directory, mark, &mut log, comm).unwrap();
+    history.open(comm).unwrap();
+    residuals.open(comm).unwrap();
     history.push(&row(3), comm).unwrap();
     residuals.push_step(3, &[0.25], comm).unwrap();
     Summary { ranks: comm.size() as usize, ..Default::default() }.write(&directory, comm).unwrap();

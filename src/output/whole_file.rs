@@ -35,6 +35,13 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
     })
 }
 
+/// Brings the names in a folder to the disk; not every file system can be told so.
+pub fn sync_names(folder: &Path) {
+    if let Ok(folder) = File::open(folder) {
+        let _ = folder.sync_all();
+    }
+}
+
 /// A file of all ranks that does not have its name yet. Rank 0 answers for it: it gives the name,
 /// or removes the file when this is dropped before.
 #[derive(Debug, Default)]

@@ -97,29 +97,41 @@ pub struct XdmfSeries {
     path: PathBuf,
     /// Step and XML of each snapshot; on rank 0 only.
     snapshots: Vec<(usize, String)>,
+    /// The file holds later ones.
+    longer: bool,
 }
 
 impl XdmfSeries {
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_path_buf(), snapshots: Vec::new() }
+        Self { path: path.to_path_buf(), snapshots: Vec::new(), longer: false }
     }
 
-    /// Continues the series of an earlier run, up to and including `last_step`.
+    /// Continues the series of an earlier run, up to and including `last_step`. Nothing is written
+    /// before [`Self::cut`].
     pub fn resume(path: &Path, last_step: usize, comm: &SimpleCommunicator) -> Result<Self> {
-        let mut snapshots = Vec::new();
+        let mut series = Self::new(path);
         on_root(comm, || {
             if path.exists() {
                 let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
                 let all = split_snapshots(&text).ok_or_else(|| not_ours(path))?;
                 let before = all.len();
-                snapshots = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
-                if snapshots.len() < before {
-                    write_whole(path, series_xml(&snapshots).as_bytes())?;
-                }
+                series.snapshots = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
+                series.longer = series.snapshots.len() < before;
             }
             Ok(())
         })?;
-        Ok(Self { path: path.to_path_buf(), snapshots })
+        Ok(series)
+    }
+
+    /// Takes what comes later out of the file.
+    pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        on_root(comm, || {
+            if self.longer {
+                write_whole(&self.path, series_xml(&self.snapshots).as_bytes())?;
+                self.longer = false;
+            }
+            Ok(())
+        })
     }
 
     /// Adds a snapshot and rewrites the file.

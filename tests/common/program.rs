@@ -3,6 +3,7 @@
 #![allow(dead_code)]
 
 use std::collections::BTreeMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Output, Stdio};
 use std::time::{Duration, Instant};
@@ -72,6 +73,19 @@ impl Running {
         job.args(words(deck, out, more, n));
         job.stdout(Stdio::piped()).stderr(Stdio::piped());
         Running(job.spawn().expect("mpirun is on the PATH"))
+    }
+
+    /// Waits for the end, which tells how it was.
+    pub fn output(&mut self) -> Output {
+        let mut read = [Vec::new(), Vec::new()];
+        if let (Some(out), Some(err)) = (&mut self.0.stdout, &mut self.0.stderr) {
+            // A run that is watched says less than a pipe holds.
+            out.read_to_end(&mut read[0]).expect("what it says");
+            err.read_to_end(&mut read[1]).expect("what it says");
+        }
+        let status = self.0.wait().expect("it is a child");
+        let [stdout, stderr] = read;
+        Output { status, stdout, stderr }
     }
 
     /// Process numbers of the ranks that live.
