@@ -167,9 +167,8 @@ fn last_passes_over_whatever_it_cannot_take() {
         fs::create_dir(at).unwrap();
         fs::write(at.join("mine"), "").unwrap();
     });
-    let cases: [(&str, Make); 8] = [
+    let cases: [(&str, Make); 7] = [
         ("No such file", link("absent")),
-        ("symbolic links", link("checkpoint-000006.h5")),
         ("it is not a file", full_folder),
         ("is not a readable HDF5 file", write(resealed(with_bit(content, 9), 1))),
         (
@@ -200,7 +199,7 @@ fn last_passes_over_whatever_it_cannot_take() {
         assert_eq!(fs::metadata(&newest).unwrap().len(), sealed.len() as u64, "written anew");
         let aside = out.join("checkpoint-000006.h5.passed-over");
         assert!(fs::symlink_metadata(&aside).is_ok(), "{why}: it is gone");
-        assert_eq!(fs::read(&aside).ok(), bytes, "{why}: it was changed");
+        assert!(fs::read(&aside).ok() == bytes, "{why}: it was changed");
     }
 
     // Older ones do not help: every reason is said, nothing is changed.
@@ -251,15 +250,13 @@ fn checkpoints_come_by_the_clock_and_the_newest_stay() {
         ("minutes=1e9", 0, &[]),
     ];
     for (case, (plan, written, left)) in cases.into_iter().enumerate() {
-        for ranks in [1, 2] {
-            let out = folder.path().join(format!("{case}-{ranks}"));
-            run_well(ranks, &deck, &out, &["--set", &format!("output.checkpoint={{{plan}}}")]);
-            let log = fs::read_to_string(out.join("log.txt")).unwrap();
-            assert_eq!(log.matches("checkpoint: ").count(), written, "{plan}\n{log}");
-            let names = contents(&out).into_keys().filter(|name| name.starts_with("checkpoint-"));
-            let expected: Vec<_> = left.iter().map(|n| format!("checkpoint-{n:06}.h5")).collect();
-            assert_eq!(names.collect::<Vec<_>>(), expected, "{plan}");
-        }
+        let out = folder.path().join(case.to_string());
+        run_well(case % 3 + 1, &deck, &out, &["--set", &format!("output.checkpoint={{{plan}}}")]);
+        let log = fs::read_to_string(out.join("log.txt")).unwrap();
+        assert_eq!(log.matches("checkpoint: ").count(), written, "{plan}\n{log}");
+        let names = contents(&out).into_keys().filter(|name| name.starts_with("checkpoint-"));
+        let expected: Vec<_> = left.iter().map(|n| format!("checkpoint-{n:06}.h5")).collect();
+        assert_eq!(names.collect::<Vec<_>>(), expected, "{plan}");
     }
 }
 
