@@ -220,10 +220,16 @@ fn a_disk_that_is_full_at_a_checkpoint() {
 /// Before the first step, and so full that not even the summary fits.
 #[test]
 fn a_disk_that_is_full_from_the_start() {
-    for (kilobytes, name) in [(4, "resolved.toml"), (8, "log.txt"), (12, "history.csv")] {
+    // The first 4 kB are those of the lock.
+    for (kilobytes, what) in [
+        (4, "in the results directory disk/out"),
+        (8, "disk/out/resolved.toml"),
+        (12, "disk/out/log.txt"),
+        (16, "disk/out/history.csv"),
+    ] {
         let folder = tempfile::tempdir().unwrap();
         let Some(ends) = on_small_disk(folder.path(), 2, kilobytes, &[], false) else { return };
-        assert_eq!(ends[0].said, format!("error: cannot write disk/out/{name}: {NO_SPACE}"));
+        assert_eq!(ends[0].said, format!("error: cannot write {what}: {NO_SPACE}"));
         assert_eq!(ends[0].code, 3);
         ends[0].assert_whole();
     }
@@ -294,7 +300,7 @@ fn a_failed_step_is_not_hidden_by_the_disk() {
 fn a_disk_that_is_full_at_any_moment() {
     for ranks in [1, 2, 3] {
         let mut named = BTreeSet::new();
-        for kilobytes in (4..1020).step_by(28) {
+        for kilobytes in (8..1020).step_by(28) {
             let folder = tempfile::tempdir().unwrap();
             let Some(ends) = on_small_disk(folder.path(), ranks, kilobytes, &[], true) else {
                 return;
