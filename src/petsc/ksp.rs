@@ -2,18 +2,19 @@
 
 use std::ptr::{null, null_mut};
 
+use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::{AsRaw, Communicator};
+use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
-use super::check::{bool_of, c_text, petsc, require_running, running, text_of};
+use super::check::{agree, bool_of, c_text, petsc, require_running, running, text_of};
 use super::vector::index;
 use super::{Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
 /// Owner of a PETSc `KSP`.
-#[derive(Debug)]
 pub struct Ksp {
     raw: sys::KSP,
+    comm: SimpleCommunicator,
     prefix: String,
     /// Matrix the solver was last given.
     matrix: u64,
@@ -47,16 +48,16 @@ impl Ksp {
     /// `prefix` without the dash: options `-<prefix>ksp_type`, `-<prefix>pc_type`, ...
     pub fn new(comm: &SimpleCommunicator, prefix: &str) -> Result<Self> {
         require_running()?;
-        let mut ksp = Ksp { raw: null_mut(), prefix: prefix.into(), matrix: 0 };
-        petsc!(KSPCreate(comm.as_raw(), &mut ksp.raw))?;
+        let mut ksp = Self::from_reference(null_mut(), comm, prefix);
+        petsc!(KSPCreate(ksp.comm.as_raw(), &mut ksp.raw))?;
         let prefix = c_text(prefix)?;
         petsc!(KSPSetOptionsPrefix(ksp.raw, prefix.as_ptr()))?;
         Ok(ksp)
     }
 
     /// Takes over one reference to a live `KSP`.
-    pub(super) fn from_reference(raw: sys::KSP, prefix: &str) -> Self {
-        Ksp { raw, prefix: prefix.into(), matrix: 0 }
+    pub(super) fn from_reference(raw: sys::KSP, comm: &SimpleCommunicator, prefix: &str) -> Self {
+        Ksp { raw, comm: comm.duplicate(), prefix: prefix.into(), matrix: 0 }
     }
 
     /// Built-in options under the prefix: pairs such as `("ksp_type", "cg")`. The user's win.
@@ -125,10 +126,11 @@ impl Ksp {
         Ok((smallest, largest))
     }
 
-    /// Solves A x = b. Not converging is an outcome, not an error: see [`KspOutcome::require`].
+    /// Solves A x = b. Not converging is an outcome, the same on all ranks, not an error: see
+    /// [`KspOutcome::require`].
     pub fn solve(&mut self, b: &Vector, x: &mut Vector) -> Result<KspOutcome> {
         petsc!(KSPSolve(self.raw, b.raw(), x.raw()))?;
-        outcome(self.raw)
+        outcome(self.raw, &self.comm).map(|(outcome, _)| outcome)
     }
 
     /// Method and preconditioner in use, for the report: for example "cg + mg".
@@ -179,29 +181,78 @@ pub fn gathered_lu(comm: &SimpleCommunicator) -> Vec<(&'static str, String)> {
     ]
 }
 
-/// The end of the last solve of a live `KSP`.
-pub(super) fn outcome(ksp: sys::KSP) -> Result<KspOutcome> {
-    let (mut reason, mut iterations, mut norm, mut text) = (0, 0, 0.0, null());
+/// How the ranks came to an [`outcome`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Ranks {
+    Agreed,
+    /// PETSc knows of the failure on some of them only.
+    Apart,
+}
+
+/// The end of the last solve of a live `KSP`: it failed on all ranks if it did on one. PETSc leaves
+/// that to the iteration's sums, and a direct solver has none: where the factors are one rank's
+/// (telescope, block Jacobi), the others take what comes for the solution. Collective.
+pub(super) fn outcome(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<(KspOutcome, Ranks)> {
+    let mine = reason_of(ksp);
+    // An error is lower than any of PETSc's reasons; the negative ones are failures.
+    let reason = *mine.as_ref().unwrap_or(&-i32::MAX);
+    let (ends, mut lowest) = ([reason, -reason], [0; 2]);
+    comm.all_reduce_into(&ends[..], &mut lowest[..], SystemOperation::min());
+    let [low, high] = [lowest[0], -lowest[1]];
+    if low > 0 {
+        return Ok((outcome_here(ksp)?, Ranks::Agreed));
+    }
+    agree(comm, mine)?;
+    let (mut outcome, cause) = agree(comm, failure_here(ksp))?;
+    let iterations = outcome.iterations;
+    comm.all_reduce_into(&iterations, &mut outcome.iterations, SystemOperation::min());
+    // The words of a rank that knows the cause, else of any on which it failed.
+    for speaks in [!outcome.converged && cause, !outcome.converged] {
+        let words = if speaks { Err(Error::Run(outcome.reason.clone())) } else { Ok(()) };
+        if let Err(words) = agree(comm, words) {
+            outcome.reason = words.to_string();
+            break;
+        }
+    }
+    outcome.converged = false;
+    Ok((outcome, if low == high { Ranks::Agreed } else { Ranks::Apart }))
+}
+
+fn reason_of(ksp: sys::KSP) -> Result<sys::KSPConvergedReason> {
+    let mut reason = 0;
     petsc!(KSPGetConvergedReason(ksp, &mut reason))?;
+    Ok(reason)
+}
+
+/// As this rank sees it.
+fn outcome_here(ksp: sys::KSP) -> Result<KspOutcome> {
+    let (mut iterations, mut norm, mut text) = (0, 0.0, null());
+    let reason = reason_of(ksp)?;
     petsc!(KSPGetConvergedReasonString(ksp, &mut text))?;
     petsc!(KSPGetIterationNumber(ksp, &mut iterations))?;
     petsc!(KSPGetResidualNorm(ksp, &mut norm))?;
-    let mut reason_text = text_of(text);
-    if reason == sys::KSP_DIVERGED_PC_FAILED {
-        let (mut pc, mut why) = (null_mut(), 0);
-        petsc!(KSPGetPC(ksp, &mut pc))?;
-        petsc!(PCGetFailedReason(pc, &mut why))?;
-        reason_text = format!("{reason_text} ({})", pc_failure(why));
-    }
     Ok(KspOutcome {
         iterations: iterations.max(0) as usize,
         converged: reason > 0,
-        reason: reason_text,
+        reason: text_of(text),
         residual_norm: norm,
     })
 }
 
-fn pc_failure(reason: sys::PCFailedReason) -> &'static str {
+/// The same with the preconditioner's cause, and whether this rank has one to tell.
+fn failure_here(ksp: sys::KSP) -> Result<(KspOutcome, bool)> {
+    let mut outcome = outcome_here(ksp)?;
+    if reason_of(ksp)? != sys::KSP_DIVERGED_PC_FAILED {
+        return Ok((outcome, false));
+    }
+    let mut pc = null_mut();
+    petsc!(KSPGetPC(ksp, &mut pc))?;
+    let cause = pc_failure(pc)?;
+    outcome.reason = format!("{} ({})", outcome.reason, name_of(cause));
+    Ok((outcome, cause != sys::PC_SUBPC_ERROR))
+}
+
+fn name_of(reason: sys::PCFailedReason) -> &'static str {
     match reason {
         sys::PC_FACTOR_STRUCT_ZEROPIVOT => "the matrix is structurally singular",
         sys::PC_FACTOR_NUMERIC_ZEROPIVOT => "zero pivot: the matrix is singular",
@@ -210,6 +261,45 @@ fn pc_failure(reason: sys::PCFailedReason) -> &'static str {
         sys::PC_SUBPC_ERROR => "an inner solver failed",
         _ => "the preconditioner could not be set up",
     }
+}
+
+/// Why a preconditioner failed on this rank; of solvers inside solvers the innermost.
+fn pc_failure(pc: sys::PC) -> Result<sys::PCFailedReason> {
+    let mut reason = sys::PC_NOERROR;
+    petsc!(PCGetFailedReason(pc, &mut reason))?;
+    if reason != sys::PC_SUBPC_ERROR {
+        return Ok(reason);
+    }
+    for inner in solvers_inside(pc)? {
+        let mut pc = null_mut();
+        petsc!(KSPGetPC(inner, &mut pc))?;
+        let cause = pc_failure(pc)?;
+        if cause != sys::PC_NOERROR {
+            return Ok(cause);
+        }
+    }
+    Ok(reason)
+}
+
+/// This rank's solvers that a preconditioner of a common kind works with.
+fn solvers_inside(pc: sys::PC) -> Result<Vec<sys::KSP>> {
+    let (mut kind, mut one) = (null(), null_mut());
+    let (mut count, mut several) = (0, null_mut());
+    petsc!(PCGetType(pc, &mut kind))?;
+    match text_of(kind).as_str() {
+        "telescope" => petsc!(PCTelescopeGetKSP(pc, &mut one))?,
+        "redundant" => petsc!(PCRedundantGetKSP(pc, &mut one))?,
+        "ksp" => petsc!(PCKSPGetKSP(pc, &mut one))?,
+        "mg" | "gamg" => petsc!(PCMGGetCoarseSolve(pc, &mut one))?,
+        "bjacobi" => petsc!(PCBJacobiGetSubKSP(pc, &mut count, null_mut(), &mut several))?,
+        "asm" => petsc!(PCASMGetSubKSP(pc, &mut count, null_mut(), &mut several))?,
+        _ => {}
+    }
+    if several.is_null() {
+        return Ok(if one.is_null() { Vec::new() } else { vec![one] });
+    }
+    // SAFETY: PETSc returned an array of `count` solvers that lives as long as `pc`.
+    Ok(unsafe { std::slice::from_raw_parts(several, count.max(0) as usize) }.to_vec())
 }
 
 pub(super) fn describe(ksp: sys::KSP) -> Result<String> {

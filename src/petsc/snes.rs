@@ -14,7 +14,7 @@ use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
 use super::hierarchy::{self, Hierarchy, Installed};
-use super::ksp;
+use super::ksp::{self, Ranks};
 use super::vector::{Values, ValuesMut, index};
 use super::{BlockProduct, Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
@@ -115,6 +115,8 @@ struct Context<'a, P> {
     linear_max: usize,
     linear_tolerances: Vec<f64>,
     linear_failure: Option<String>,
+    /// PETSc does not know of it on every rank, and was stopped.
+    apart: bool,
 }
 
 impl Snes {
@@ -168,7 +170,7 @@ impl Snes {
         let mut inner = null_mut();
         petsc!(SNESGetKSP(self.raw, &mut inner))?;
         petsc!(PetscObjectReference(inner.cast()))?;
-        Ok(Ksp::from_reference(inner, &self.prefix))
+        Ok(Ksp::from_reference(inner, &self.comm, &self.prefix))
     }
 
     /// Collective. Iterates from `x` to a solution, left in `x`. Not converging is an outcome;
@@ -198,6 +200,7 @@ impl Snes {
             linear_max: 0,
             linear_tolerances: Vec::new(),
             linear_failure: None,
+            apart: false,
         };
         // The callbacks get this pointer back while `SNESSolve` runs and at no other time.
         let data: *mut c_void = (&raw mut context).cast();
@@ -217,11 +220,14 @@ impl Snes {
             self.forget()?;
             return Err(error);
         }
-        solved?;
-
-        let (mut reason, mut text) = (0, null());
-        petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
-        petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
+        let (mut reason, mut text) = (sys::SNES_DIVERGED_LINEAR_SOLVE, null());
+        if context.apart {
+            self.forget()?;
+        } else {
+            solved?;
+            petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
+            petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
+        }
         let converged = reason > 0;
         let linear_failure = !converged && reason == sys::SNES_DIVERGED_LINEAR_SOLVE;
         let reason = match (context.diverged, context.linear_failure) {
@@ -268,7 +274,17 @@ impl<P: NewtonProblem> Context<'_, P> {
         result: Result<T>,
         then: impl FnOnce(&mut Self, T) -> Result<()>,
     ) -> sys::PetscErrorCode {
-        match agree(self.comm, result).and_then(|value| then(self, value)) {
+        let result = agree(self.comm, result);
+        self.go_on(result, then)
+    }
+
+    /// The same with a result that is the same on all ranks.
+    fn go_on<T>(
+        &mut self,
+        result: Result<T>,
+        then: impl FnOnce(&mut Self, T) -> Result<()>,
+    ) -> sys::PetscErrorCode {
+        match result.and_then(|value| then(self, value)) {
             Ok(()) => 0,
             Err(error) => {
                 self.error.get_or_insert(error);
@@ -373,7 +389,8 @@ unsafe extern "C" fn after_solve<P: NewtonProblem>(
 ) -> sys::PetscErrorCode {
     // SAFETY: as in `residual`.
     let context = unsafe { &mut *data.cast::<Context<P>>() };
-    context.settle(ksp::outcome(inner), |context, outcome| {
+    let outcome = ksp::outcome(inner, context.comm);
+    let code = context.go_on(outcome, |context, (outcome, ranks)| {
         let mut tolerance = 0.0;
         petsc!(KSPGetTolerances(inner, &mut tolerance, null_mut(), null_mut(), null_mut()))?;
         context.linear_tolerances.push(tolerance);
@@ -388,9 +405,12 @@ unsafe extern "C" fn after_solve<P: NewtonProblem>(
                 "the linear solver ended with {} after {} iterations",
                 outcome.reason, outcome.iterations
             ));
+            context.apart = ranks == Ranks::Apart;
         }
         Ok(())
-    })
+    });
+    // Ranks that take the solve for a good one would go on without the others.
+    if context.apart { sys::PETSC_ERR_USER as sys::PetscErrorCode } else { code }
 }
 
 unsafe extern "C" fn assess<P: NewtonProblem>(
