@@ -35,6 +35,11 @@ pub struct Model<const D: usize> {
 }
 
 impl<const D: usize> Model<D> {
+    /// Whether every body has Ghost stiffness.
+    pub fn stabilised(&self) -> bool {
+        self.penalties.iter().all(|penalty| penalty.stiffness > 0.0)
+    }
+
     /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.
     pub fn point_forces(
         &self,

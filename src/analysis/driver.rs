@@ -17,15 +17,15 @@ use crate::output::start;
 use crate::output::summary::Status;
 use crate::output::{ResultsDirectory, RunLock};
 use crate::parallel::{World, signals};
-use crate::petsc::known;
 use crate::petsc::log::Stages;
 use crate::petsc::session::{self, Session};
+use crate::petsc::{files, known};
 
 use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
 use super::{balance, conditioning, discretise, explicit, implicit_dynamic, quasi_static};
-use super::{plan, process, setup, support};
+use super::{plan, process, setup, solver, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
@@ -65,6 +65,7 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     let deck = world.fail_together(deck::read(&arguments.input, &text, &arguments.sets))?;
     let session = Session::start(universe, &deck.petsc, &arguments.petsc)?;
     world.fail_together(known::require_known())?;
+    files::require_writable(world.comm())?;
     let mut log = Log::new(world.comm());
     let versions = versions();
     log.say(&report::banner(&Banner {
@@ -155,8 +156,10 @@ impl Run<'_> {
             let first = quasi_static::first_span(&model.deck);
             support::require(world, &model, &points, &active, first)?;
         }
-        self.log.say(&report::plan(&plan::of(world, &model, &points, &active)));
+        let plan = plan::of(world, &model, &points, &active);
+        self.log.say(&report::plan(&plan));
         drop(active);
+        solver::rehearse(world, &model, plan.equations)?;
         if self.arguments.check {
             self.log.say("The deck is good; nothing was run (--check).");
             return Ok(());
@@ -197,11 +200,17 @@ impl Run<'_> {
                 implicit_dynamic::run(world, &mut model, &mut points, &mut recorder, &mut clock)
             }
         };
+        let mut of_numerics = true;
         let (ending, kind): (_, fn(String) -> Error) = match outcome {
             Ok(ending) => (ending, Error::Run),
             Err(error) => {
                 let of_files = error.exit_code() == 3;
-                let kind = if of_files { Error::File } else { Error::Run };
+                of_numerics = error.exit_code() == 1;
+                let kind = match error.exit_code() {
+                    3 => Error::File,
+                    4 => Error::Environment,
+                    _ => Error::Run,
+                };
                 if of_files {
                     recorder.leave_unrecorded();
                 }
@@ -241,10 +250,15 @@ impl Run<'_> {
             what: ending.reason.clone(),
             last_good_step: Some(recorder.steps_completed),
             results: Some(recorder.directory()),
-            // Whoever sent a signal needs no advice, and no numerics heals a full disk.
+            // Whoever sent a signal needs no advice, and no numerics heals a full disk or an
+            // option that PETSc refuses.
             advice: match kind(String::new()).exit_code() {
                 _ if ending.on_request => Vec::new(),
                 3 => vec![checkpointing::advice(world, &recorder.directory())],
+                _ if !of_numerics => Vec::new(),
+                _ if recorder.stuck_at_round_off => {
+                    vec!["raise analysis.tolerance: the residual no longer falls".into()]
+                }
                 _ => advice(&model.deck),
             },
             ..Failure::default()

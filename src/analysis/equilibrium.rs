@@ -65,6 +65,10 @@ pub struct Equilibrium<'a, const D: usize> {
     diagonal_scale: f64,
     /// Normalised error of each evaluation that was accepted.
     pub errors: Vec<f64>,
+    /// Numerator of the last, N.
+    residual_norm: f64,
+    /// Its denominator, N.
+    actions_norm: f64,
     /// Health of the last evaluation on this rank.
     pub health: Health,
     /// Wall time of all evaluations, s.
@@ -130,6 +134,8 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             reaction_owned: vec![0.0; owned],
             diagonal_scale: 0.0,
             errors: Vec::new(),
+            residual_norm: 0.0,
+            actions_norm: 0.0,
             health: Health::default(),
         })
     }
@@ -308,6 +314,19 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         last * (last / before) <= self.settings.tolerance
     }
 
+    /// Whether the error has stopped falling, at the round-off of the forces that the residual is
+    /// the difference of: no better solver or smaller step would bring it down.
+    pub fn stuck_at_round_off(&self) -> bool {
+        let cell = match self.grid {
+            Grid::Lattice(lattice) => lattice.spacing.iter().fold(0.0, |a: f64, b| a.max(*b)),
+            Grid::Mesh(mesh) => mesh.cell_size(),
+        };
+        // Strains carry the round-off of F = 1 + grad u, forces that of stresses on a cell.
+        let strained = self.diagonal_scale * cell * ((self.numbering.total * D) as f64).sqrt();
+        let round_off = f64::EPSILON * (strained + self.actions_norm);
+        no_longer_falls(&self.errors) && self.residual_norm <= NEAR * round_off
+    }
+
     /// f_react = f_int(old) + K (x - x_old) - f_ext on the fixed degrees of freedom.
     fn accumulate_reactions(&mut self, x: &[f64]) -> Result<()> {
         let mut change = vec![0.0; self.numbering.len() * D];
@@ -322,7 +341,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     }
 
     /// Lagrangian eq. 40. Degrees of freedom left out carry no equation and do not count.
-    fn normalised_error(&self) -> f64 {
+    fn normalised_error(&mut self) -> f64 {
         let (mut residual, mut actions) = (0.0, 0.0);
         let mut next_fixed = self.held.fixed().peekable();
         for dof in 0..self.external_owned.len() {
@@ -335,7 +354,8 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             actions += action * action;
         }
         let sums = self.world.sum_slice(&[residual, actions]);
-        sums[0].sqrt() / (sums[1].sqrt() + f64::EPSILON)
+        (self.residual_norm, self.actions_norm) = (sums[0].sqrt(), sums[1].sqrt());
+        self.residual_norm / (self.actions_norm + f64::EPSILON)
     }
 }
 
@@ -426,6 +446,16 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 }
 
+/// Residuals below so many times the estimated round-off can be nothing else.
+const NEAR: f64 = 1e3;
+
+/// The last three errors are not below half of the least before them.
+fn no_longer_falls(errors: &[f64]) -> bool {
+    let Some((before, last)) = errors.split_last_chunk::<3>() else { return false };
+    let least = |errors: &[f64]| errors.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    !before.is_empty() && last.iter().all(|e| e.is_finite()) && least(last) > 0.5 * least(before)
+}
+
 /// Mean size of the free diagonal entries over all ranks; 1 where there are none. Collective.
 fn mean_diagonal<const D: usize, R: BlockRows<D>>(
     world: &World,
@@ -446,4 +476,20 @@ fn mean_diagonal<const D: usize, R: BlockRows<D>>(
     }
     let (sum, count) = (world.sum(sum), world.sum_usize(count));
     if count > 0 && sum > 0.0 { sum / count as f64 } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::no_longer_falls;
+
+    #[test]
+    fn errors_that_no_longer_fall() {
+        assert!(no_longer_falls(&[1.0, 1e-3, 2e-9, 3e-9, 1.1e-9, 4e-9]));
+        // Still on the way, by large steps or small ones.
+        assert!(!no_longer_falls(&[1.0, 1e-3, 1e-7, 2e-14]));
+        assert!(!no_longer_falls(&[1.0, 0.7, 0.5, 0.4, 0.3, 0.2]));
+        // Too few, or not numbers.
+        assert!(!no_longer_falls(&[1e-9, 1e-9, 1e-9]));
+        assert!(!no_longer_falls(&[1e-9, 1e-9, 1e-9, f64::NAN]));
+    }
 }

@@ -137,15 +137,7 @@ impl<const B: usize> Reduced<'_, B> {
         let matrix = Matrix::from_csr(comm, B, rows, &offsets, &columns, &values)?;
         let (mut right, mut left) = (matrix.vector()?, matrix.vector()?);
         right.values_mut()?.copy_from_slice(&self.start());
-        let mut ksp = Ksp::new(comm, "kappa_")?;
-        ksp.set_defaults(&[
-            ("ksp_type", "cg"),
-            ("pc_type", "none"),
-            ("ksp_rtol", "1e-10"),
-            ("ksp_max_it", "5000"),
-        ])?;
-        ksp.set_compute_singular_values()?;
-        ksp.set_from_options()?;
+        let mut ksp = petsc_solver(self.world, PREFIX)?;
         ksp.set_operators(&matrix)?;
         ksp.solve(&right, &mut left)?;
         let (smallest, largest) = ksp.extreme_singular_values()?;
@@ -241,6 +233,23 @@ fn largest_of_tridiagonal(diagonal: &[f64], side: &[f64]) -> f64 {
         }
     }
     high
+}
+
+/// Of the options of the solver that eigenvalues are estimated by.
+pub const PREFIX: &str = "kappa_";
+
+/// That solver with options of this prefix.
+pub fn petsc_solver(world: &World, prefix: &str) -> Result<Ksp> {
+    let mut ksp = Ksp::new(world.comm(), prefix)?;
+    ksp.set_defaults(&[
+        ("ksp_type", "cg"),
+        ("pc_type", "none"),
+        ("ksp_rtol", "1e-10"),
+        ("ksp_max_it", "5000"),
+    ])?;
+    ksp.set_compute_singular_values()?;
+    ksp.set_from_options()?;
+    Ok(ksp)
 }
 
 #[cfg(test)]

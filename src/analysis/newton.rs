@@ -65,7 +65,7 @@ pub fn solve<const D: usize>(
         .time(Phase::Assemble, || solver::matrix(world, &model.grid, numbering, &mesh.pattern))?;
     let mut solution = matrix.vector()?;
     let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
-    let stabilised = model.penalties.iter().all(|penalty| penalty.stiffness > 0.0);
+    let stabilised = model.stabilised();
     let (outcome, used) = solve_robustly(
         world,
         &mut problem,
@@ -87,6 +87,7 @@ pub fn solve<const D: usize>(
     clock.add(Phase::Solve, clock.elapsed() - before - assembled);
 
     recorder.iterations(world, number, &problem.errors)?;
+    recorder.stuck_at_round_off = !outcome.converged && problem.stuck_at_round_off();
     if !outcome.converged {
         let point = problem.refused_point(points);
         let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));

@@ -40,6 +40,8 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
+    /// The last solve failed as its residual no longer fell.
+    pub stuck_at_round_off: bool,
     /// The last step with a row in the history.
     recorded: usize,
     /// Those of them before a restart.
@@ -155,6 +157,7 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
+            stuck_at_round_off: false,
             recorded: 0,
             earlier_steps: 0,
             reached: (0.0, 0.0),

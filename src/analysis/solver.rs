@@ -7,14 +7,18 @@
 //! direct solver sums in the order in which messages arrive; on one rank it repeats bit by bit, and
 //! is faster at these sizes too.
 
-use crate::assembly::{Numbering, Pattern};
+use crate::assembly::{Numbering, Pattern, inverse};
+use crate::deck::model::AnalysisType;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::output::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
-use crate::petsc::options;
 use crate::petsc::snes::Snes;
+use crate::petsc::{Rehearsal, options};
+
+use super::discretise::Model;
+use super::extremes;
 
 /// Equations up to which the direct solver is the default in 2D and 3D: multigrid is faster from
 /// about a thousand on, but small studies like their residuals exact.
@@ -151,6 +155,9 @@ impl Linear {
     }
 }
 
+/// Of the options of the equilibrium solver.
+const PREFIX: &str = "qs_";
+
 /// Newton's method with a built-in linear solver. `null_pivots`: the
 /// system may be singular and consistent, and a direct solver has to look for zero pivots.
 pub fn newton(
@@ -159,14 +166,58 @@ pub fn newton(
     null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
-    let mut snes = Snes::new(world.comm(), "qs_", max_evaluations.saturating_sub(1).max(1))?;
-    snes.set_defaults(&linear.options(world.size()))?;
+    newton_under(PREFIX, world, linear, null_pivots, max_evaluations)
+}
+
+/// The same with options of another prefix.
+fn newton_under(
+    prefix: &str,
+    world: &World,
+    linear: Linear,
+    null_pivots: bool,
+    max_evaluations: usize,
+) -> Result<Snes> {
+    let mut snes = Snes::new(world.comm(), prefix, max_evaluations.saturating_sub(1).max(1))?;
+    let mut defaults = linear.options(world.size());
+    if !factors(prefix)? {
+        // Mumps has no others than those of LU and Cholesky.
+        defaults.retain(|(name, _)| *name != "pc_factor_mat_solver_type");
+    }
+    snes.set_defaults(&defaults)?;
     if null_pivots && matches!(linear, Linear::Direct | Linear::DirectOnOne) {
         let inner = if linear.gathers(world.size()) { "telescope_" } else { "" };
         snes.set_defaults(&[(&format!("{inner}mat_mumps_icntl_24"), "1")])?;
     }
     snes.set_from_options()?;
     Ok(snes)
+}
+
+/// Whether the preconditioner is, for all the user says, a complete factorisation.
+fn factors(prefix: &str) -> Result<bool> {
+    let name = format!("{prefix}pc_type");
+    let chosen = if options::is_users(&name)? { options::get(&name)? } else { None };
+    Ok(chosen.is_none_or(|chosen| ["lu", "cholesky"].contains(&chosen.as_str())))
+}
+
+/// Tries the user's options on a small system, before anything is written. `equations`: of the
+/// first step. Collective. Error: PETSc cannot work with them.
+pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usize) -> Result<()> {
+    let comm = world.comm();
+    if let Some(rehearsal) = Rehearsal::new(inverse::PREFIX)? {
+        rehearsal.linear::<1>(comm, |prefix| inverse::petsc_solver(world, prefix))?;
+    }
+    if let Some(rehearsal) = Rehearsal::new(extremes::PREFIX)? {
+        rehearsal.linear::<D>(comm, |prefix| extremes::petsc_solver(world, prefix))?;
+    }
+    if !matches!(
+        model.deck.analysis.kind,
+        AnalysisType::QuasiStatic | AnalysisType::ImplicitDynamic
+    ) {
+        return Ok(());
+    }
+    let Some(rehearsal) = Rehearsal::new(PREFIX)? else { return Ok(()) };
+    let linear = Linear::of::<D>(equations, model.stabilised(), &Trials::default())?;
+    rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, false, 3))
 }
 
 /// The system's matrix, still zero, with its block size and near-null space. Collective.

@@ -71,8 +71,8 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             .collect();
         let free: Vec<bool> =
             (0..rows * D).map(|dof| !held[dof] && diagonal[dof / D] != 0.0).collect();
-        let method = if options::any_set("mass_")? {
-            Method::Petsc(Box::new(petsc_solver(world)?))
+        let method = if options::any_set(PREFIX)? {
+            Method::Petsc(Box::new(petsc_solver(world, PREFIX)?))
         } else if world.size() == 1
             && envelope::cost(pattern, rows) < FACTOR_BELOW * pattern.ghost_start as f64
         {
@@ -305,8 +305,12 @@ fn side_by_side<const D: usize, const C: usize>(
     Ok(([part(0), part(1)], iterations))
 }
 
-fn petsc_solver(world: &World) -> Result<Ksp> {
-    let mut ksp = Ksp::new(world.comm(), "mass_")?;
+/// Of the options that hand the system to PETSc.
+pub const PREFIX: &str = "mass_";
+
+/// PETSc's solver with options of this prefix.
+pub fn petsc_solver(world: &World, prefix: &str) -> Result<Ksp> {
+    let mut ksp = Ksp::new(world.comm(), prefix)?;
     ksp.set_defaults(&[
         ("ksp_type", "cg"),
         ("pc_type", "jacobi"),

@@ -66,6 +66,13 @@ pub(super) fn check(code: sys::PetscErrorCode, function: &str) -> Result<()> {
     })
 }
 
+/// PETSc's own words in an error of [`check`], without the trace around them.
+pub(super) fn essence(error: &Error) -> String {
+    let text = error.to_string();
+    let text = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest);
+    text.split(" (in ").next().unwrap_or(text).lines().next().unwrap_or(text).trim().to_string()
+}
+
 /// The return code of a callback of our own that failed; the text is there for the caller of PETSc.
 pub(super) fn keep(error: &Error) -> sys::PetscErrorCode {
     if let Ok(mut message) = MESSAGE.lock() {

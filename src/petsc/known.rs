@@ -4,9 +4,9 @@
 //! shown, under a name of its own, to solvers of all kinds: an option that none of them reads is
 //! a mistake. One that is known but not used by the run is only warned of at its end.
 
-use std::ptr::{null, null_mut};
+use std::ptr::null_mut;
 
-use super::check::{c_text, petsc};
+use super::check::{c_text, essence, petsc};
 use super::{options, sys};
 use crate::error::{Error, Result};
 
@@ -107,6 +107,10 @@ const PRECONDITIONERS: [&str; 24] = [
     "hmg",
     "svd",
 ];
+/// Limits of linear solvers that PETSc takes as they are.
+const NOT_NEGATIVE: [&str; 4] = ["ksp_max_it", "ksp_rtol", "ksp_atol", "ksp_divtol"];
+/// Nonlinear solvers that assemble and solve as [`super::snes`] needs it.
+const NEWTON: [&str; 2] = ["newtonls", "newtontr"];
 /// For suggestions.
 const USUAL: [&str; 22] = [
     "ksp_type",
@@ -136,7 +140,7 @@ const USUAL: [&str; 22] = [
 const PROBE: &str = "probe_";
 
 /// An error that names every option nobody could know, and values that PETSc refuses. Call it
-/// after the session's start, before any solver is made.
+/// on all ranks after the session's start, before any solver is made.
 pub fn require_known() -> Result<()> {
     let mut problems = Vec::new();
     for option in options::unused()? {
@@ -146,8 +150,9 @@ pub fn require_known() -> Result<()> {
             Answer::Known => {}
             Answer::Unknown => problems.push(unknown(bare)?),
             Answer::Refused(why) => {
-                problems.push(format!("PETSc does not accept {name} {value}: {why}"));
+                problems.push(format!("PETSc does not accept {option}: {why}"));
             }
+            Answer::Unsuited(why) => problems.push(format!("{option}: {why}")),
         }
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::Input(problems.join("\n"))) }
@@ -157,7 +162,10 @@ pub fn require_known() -> Result<()> {
 enum Answer {
     Known,
     Unknown,
+    /// By PETSc.
     Refused(String),
+    /// By this program.
+    Unsuited(String),
 }
 
 fn judge(name: &str, value: &str) -> Result<Answer> {
@@ -165,12 +173,19 @@ fn judge(name: &str, value: &str) -> Result<Answer> {
     let Some(own) = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix)) else {
         return Ok(if begins(&GENERAL, name) { Answer::Known } else { Answer::Unknown });
     };
+    if own.starts_with("npc_") || (own == "snes_type" && !NEWTON.contains(&value)) {
+        let why = format!("the equations are solved by {}", NEWTON.join(" or "));
+        return Ok(Answer::Unsuited(why));
+    }
     let base = without_nesting(own);
+    if NOT_NEGATIVE.contains(&base) && value.parse().is_ok_and(|number: f64| number < 0.0) {
+        return Ok(Answer::Unsuited("expected a number >= 0".into()));
+    }
     if begins(&READ_LATER, base) { Ok(Answer::Known) } else { ask(base, value) }
 }
 
 /// `mg_levels_1_pc_type` is `pc_type` of a solver inside.
-fn without_nesting(mut name: &str) -> &str {
+pub(super) fn without_nesting(mut name: &str) -> &str {
     loop {
         let inner = NESTED
             .iter()
@@ -192,7 +207,8 @@ fn without_nesting(mut name: &str) -> &str {
     }
 }
 
-/// Shows the option to solvers of all kinds.
+/// Shows the option to solvers of all kinds. Its value is refused if all do that know the name:
+/// other values may suit the run's kind only.
 fn ask(base: &str, value: &str) -> Result<Answer> {
     let kinds = if base.starts_with("snes_") {
         vec![Kind::Newton]
@@ -201,17 +217,13 @@ fn ask(base: &str, value: &str) -> Result<Answer> {
         methods.chain(PRECONDITIONERS.iter().map(|pc| Kind::Linear("preonly", pc))).collect()
     };
     let shown = format!("-{PROBE}{base}");
-    let (key, text) = (c_text(&shown)?, c_text(value)?);
+    let mut refused = None;
     for kind in kinds {
         // A kind that this PETSc lacks, or that cannot be set up alone, has no say.
         if kind.read_options().is_err() {
             continue;
         }
-        petsc!(PetscOptionsSetValue(
-            null_mut(),
-            key.as_ptr(),
-            if value.is_empty() { null() } else { text.as_ptr() }
-        ))?;
+        options::set(&shown, value)?;
         let outcome = kind.read_options();
         let mut used = sys::PETSC_FALSE;
         // The database keeps names without their dash.
@@ -219,22 +231,15 @@ fn ask(base: &str, value: &str) -> Result<Answer> {
         petsc!(PetscOptionsUsed(null_mut(), stored.as_ptr(), &mut used))?;
         options::clear(&shown)?;
         if used != sys::PETSC_FALSE {
-            return Ok(match outcome {
-                Ok(()) => Answer::Known,
-                // Other values may suit the run and not the probe (its one rank, its kind).
-                Err(error) if base.ends_with("type") => Answer::Refused(essence(&error)),
-                Err(_) => Answer::Known,
-            });
+            match outcome {
+                Ok(()) => return Ok(Answer::Known),
+                Err(error) => {
+                    refused.get_or_insert_with(|| Answer::Refused(essence(&error)));
+                }
+            }
         }
     }
-    Ok(Answer::Unknown)
-}
-
-/// PETSc's own words without the trace around them.
-fn essence(error: &Error) -> String {
-    let text = error.to_string();
-    let text = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest);
-    text.split(" (in ").next().unwrap_or(text).lines().next().unwrap_or(text).trim().to_string()
+    Ok(refused.unwrap_or(Answer::Unknown))
 }
 
 fn unknown(name: &str) -> Result<String> {
@@ -274,16 +279,16 @@ impl Kind {
     }
 }
 
-/// This process alone: every rank asks for itself.
-fn alone() -> sys::MPI_Comm {
+/// All ranks: some values suit as many as there are.
+fn world() -> sys::MPI_Comm {
     // SAFETY: a constant of a running MPI.
-    unsafe { mpi::ffi::RSMPI_COMM_SELF }
+    unsafe { mpi::ffi::RSMPI_COMM_WORLD }
 }
 
 fn newton() -> Result<()> {
     let prefix = c_text(PROBE)?;
     let mut snes = null_mut();
-    petsc!(SNESCreate(alone(), &mut snes))?;
+    petsc!(SNESCreate(world(), &mut snes))?;
     let outcome = petsc!(SNESSetOptionsPrefix(snes, prefix.as_ptr()))
         .and_then(|()| petsc!(SNESSetType(snes, sys::SNESNEWTONLS.as_ptr().cast())))
         .and_then(|()| petsc!(SNESSetFromOptions(snes)));
@@ -294,7 +299,7 @@ fn newton() -> Result<()> {
 fn linear(method: &str, pc_type: &str) -> Result<()> {
     let (prefix, method, pc_name) = (c_text(PROBE)?, c_text(method)?, c_text(pc_type)?);
     let (mut ksp, mut pc) = (null_mut(), null_mut());
-    petsc!(KSPCreate(alone(), &mut ksp))?;
+    petsc!(KSPCreate(world(), &mut ksp))?;
     let outcome = petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))
         .and_then(|()| petsc!(KSPSetType(ksp, method.as_ptr())))
         .and_then(|()| petsc!(KSPGetPC(ksp, &mut pc)))

@@ -6,6 +6,8 @@
 //! | `check.rs` | return codes to errors; one rank's error becomes every rank's |
 //! | `session.rs` | start and end of PETSc, order of the options, abort |
 //! | `options.rs` | defaults that the user can override, options nobody read |
+//! | `files.rs` | files that options name, tried before PETSc does |
+//! | `rehearsal.rs` | [`Rehearsal`]: the user's options tried on a small system |
 //! | `known.rs` | options no solver knows, told before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
@@ -26,6 +28,7 @@
 mod block_product;
 mod blocks;
 mod check;
+pub mod files;
 mod forcing;
 mod half;
 mod hierarchy;
@@ -35,6 +38,7 @@ pub mod log;
 pub mod matrix;
 mod object;
 pub mod options;
+mod rehearsal;
 pub mod session;
 pub mod snes;
 mod stored;
@@ -49,6 +53,7 @@ pub use half::Half;
 pub use hierarchy::{CoarsestRows, Hierarchy, Smoothed};
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
+pub use rehearsal::Rehearsal;
 pub use session::{Session, abort_all, version};
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
 pub use stored::Stored;

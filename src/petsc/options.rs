@@ -20,11 +20,17 @@ pub fn set_default(name: &str, value: &str) -> Result<()> {
     if !ours && is_set(&name)? {
         return Ok(());
     }
-    let (key, text) = (c_text(&name)?, c_text(value)?);
-    let text = if value.is_empty() { null() } else { text.as_ptr() };
-    petsc!(PetscOptionsSetValue(null_mut(), key.as_ptr(), text))?;
+    set(&name, value)?;
     built_in(|names| names.insert(name));
     Ok(())
+}
+
+/// Sets an option, whoever set it before. "" for a bare flag.
+pub fn set(name: &str, value: &str) -> Result<()> {
+    require_running()?;
+    let (key, text) = (c_text(&dashed(name))?, c_text(value)?);
+    let text = if value.is_empty() { null() } else { text.as_ptr() };
+    petsc!(PetscOptionsSetValue(null_mut(), key.as_ptr(), text))
 }
 
 /// Is the option set, by whomever? Asking does not count as reading it.
@@ -73,6 +79,16 @@ pub fn clear(name: &str) -> Result<()> {
     require_running()?;
     let key = c_text(&dashed(name))?;
     petsc!(PetscOptionsClearValue(null_mut(), key.as_ptr()))
+}
+
+/// Removes the options that start like this, whoever set them, and what is known of them.
+pub fn clear_all(prefix: &str) -> Result<()> {
+    let prefix = dashed(prefix);
+    for name in all()?.split_whitespace().filter(|word| word.starts_with(&prefix)) {
+        clear(name)?;
+    }
+    built_in(|names| names.retain(|name| !name.starts_with(&prefix)));
+    Ok(())
 }
 
 /// Options set by the user and read by no object so far, as `-name value`.

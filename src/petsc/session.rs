@@ -8,14 +8,15 @@
 //! ([`super::options::set_default`]).
 
 use std::ffi::{CString, c_char, c_int};
+use std::io::Write as _;
 use std::marker::PhantomData;
 use std::ptr::null;
 
 use mpi::environment::Universe;
 use mpi::traits::{Communicator, Root};
 
-use super::check::{check, petsc, remember};
-use super::{options, sys};
+use super::check::{agree, check, essence, petsc, remember};
+use super::{files, options, sys};
 use crate::error::{Error, Result};
 
 /// PETSc between its start and its end. The borrow of the universe makes it end before MPI.
@@ -29,7 +30,8 @@ impl<'u> Session<'u> {
     /// values ("" for a bare flag); `words` the command line's words, dashes included. The
     /// lists of rank 0 count on all ranks.
     ///
-    /// Errors: PETSc was started before, or its start failed (an unreadable options file).
+    /// Errors: PETSc was started before; a file with options cannot be read. Where PETSc's own
+    /// start fails, all ranks end ([`abort_all`]).
     pub fn start(
         universe: &'u Universe,
         table: &[(String, String)],
@@ -43,6 +45,9 @@ impl<'u> Session<'u> {
         }
         let environment = std::env::var("PETSC_OPTIONS").unwrap_or_default();
         let arguments = broadcast(universe, argument_list(table, &environment, words));
+        let rank = universe.world().rank();
+        let readable = if rank == 0 { files::require_readable(&arguments) } else { Ok(()) };
+        agree(&universe.world(), readable)?;
         install_panic_hook();
 
         // PETSc keeps the argument list for its whole life.
@@ -59,8 +64,13 @@ impl<'u> Session<'u> {
         let count: &'static mut c_int = Box::leak(Box::new(strings.len() as c_int));
         let list: &'static mut *mut *mut c_char =
             Box::leak(Box::new(Box::leak(pointers.into_boxed_slice()).as_mut_ptr()));
+        // Before the start: PETSc would fill the screen with what has failed in it.
+        petsc!(PetscPushErrorHandler(Some(remember), std::ptr::null_mut()))?;
         // SAFETY: a null-terminated argument list that lives for ever; the help texts may be null.
-        check(unsafe { sys::PetscInitialize(count, list, null(), null()) }, "PetscInitialize")?;
+        let code = unsafe { sys::PetscInitialize(count, list, null(), null()) };
+        if let Err(error) = check(code, "PetscInitialize") {
+            end_all(rank, &format!("PETSc could not be started: {}", essence(&error)));
+        }
         petsc!(PetscPushErrorHandler(Some(remember), std::ptr::null_mut()))?;
         // Signals stay the program's own: PETSc would turn each into an abort.
         petsc!(PetscPopSignalHandler())?;
@@ -86,10 +96,28 @@ impl<'u> Session<'u> {
 
 impl Drop for Session<'_> {
     fn drop(&mut self) {
+        let mut rank = 0;
         // SAFETY: PETSc was started by this session and MPI is alive (borrow of the universe).
-        // Nobody is left to act on a failure.
-        unsafe { sys::PetscFinalize() };
+        let code = unsafe {
+            mpi::ffi::MPI_Comm_rank(mpi::ffi::RSMPI_COMM_WORLD, &mut rank);
+            sys::PetscFinalize()
+        };
+        if let Err(error) = check(code, "PetscFinalize") {
+            end_all(rank, &format!("PETSc could not be ended in order: {}", essence(&error)));
+        }
     }
+}
+
+/// For a failure inside PETSc that other ranks may not see: they would wait for ever.
+fn end_all(rank: i32, message: &str) -> ! {
+    if rank != 0 {
+        // Where all have failed, the first speaks for all.
+        std::thread::sleep(std::time::Duration::from_secs(2));
+    }
+    let _ = writeln!(std::io::stderr(), "error: {message}");
+    // Time for the line to get out: mpirun has much to say of an abort.
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    abort_all(Error::Environment(String::new()).exit_code())
 }
 
 /// The full argument list, program name first.

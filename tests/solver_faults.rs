@@ -1,0 +1,246 @@
+//! Solvers that fail on one rank, and options that PETSc cannot work with: the same message and
+//! exit code on any number of ranks, and no rank that waits for another for ever (the time limit of
+//! a run ends it).
+
+mod common;
+
+use common::run::{Outcome, Run};
+
+/// A soft block on smooth ground under its own weight, without Ghost stiffness.
+const BLOCK: &str = r#"title = "Block"
+[analysis]
+type = "quasi-static"
+steps = 2
+[method]
+basis = "gimp"
+domain_update = "stretch"
+[grid]
+type = "lattice"
+size = [6, 4]
+h = 0.5
+[material.soil]
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[body]]
+name = "block"
+material = "soil"
+density = 1000.0
+shape = { box = { min = [0, 0], max = [4, 3] } }
+points_per_cell = [2, 2]
+[[boundary]]
+name = "ground"
+where = { side = "bottom" }
+fix = ["y"]
+[[boundary]]
+name = "symmetry"
+where = { side = "left" }
+fix = ["x"]
+[[load]]
+gravity = [0, -20]
+"#;
+
+fn block() -> Run {
+    Run::text(BLOCK)
+}
+
+fn with(words: &str) -> Run {
+    words.split_whitespace().fold(block(), |run, word| run.word(word))
+}
+
+/// What the program said on its error channel, without what mpirun adds.
+fn said(outcome: &Outcome) -> String {
+    let text = outcome.stderr.split("-----").next().unwrap_or_default();
+    let scratch = format!("{}/", outcome.folder.path().display());
+    text.trim_end().replace(&scratch, "")
+}
+
+/// Refused as bad input with this message, on `ranks`, and nothing is left.
+#[track_caller]
+fn refused_on(ranks: &[usize], run: &Run, message: &str) {
+    for &ranks in ranks {
+        let outcome = run.clone().ranks(ranks).attempt();
+        assert_eq!(said(&outcome), message, "on {ranks} ranks");
+        assert_eq!(outcome.code, 2, "on {ranks} ranks: {message}");
+        assert_eq!(outcome.files(), ["deck.toml"], "on {ranks} ranks: {message}");
+    }
+}
+
+#[track_caller]
+fn refused(run: &Run, message: &str) {
+    refused_on(&[1, 2, 3], run, message);
+}
+
+/// A piece of the body that nothing holds, on a rank of its own.
+fn loose_piece() -> Run {
+    block().set("method.basis=mpm").set("body.0.points_per_cell=1").set(
+        "body.0.shape={ union = [{ box = { min = [0, 0], max = [1, 1] } }, \
+         { box = { min = [2, 2], max = [2.5, 2.5] } }] }",
+    )
+}
+
+/// A mechanism: too few points for the cells' modes.
+fn sparse_points() -> Run {
+    let piece = "points_per_cell = [2, 2]";
+    assert!(BLOCK.contains(piece));
+    let lattice = "lattice = { spacing = 1.0, offset = [0.25, 0.25] }";
+    Run::text(&BLOCK.replace(piece, lattice)).set("method.basis=mpm")
+}
+
+const SINGULAR: &str =
+    "error: step 1 of 2 could not be solved: Newton's method failed (the linear \
+solver ended with DIVERGED_PC_FAILED (zero pivot: the matrix is singular) after 0 iterations); the \
+last finished step is 0
+    try: stabilise small overlaps: [ghost] stiffness_factor = 1.0
+    try: let steps be cut: analysis.on_failure = \"cut\"
+    try: more, smaller steps: analysis.steps
+results: out, good up to step 0";
+
+/// The factors are one rank's, and only that rank sees that they do not exist.
+#[test]
+fn a_singular_system_ends_all_ranks_with_one_message() {
+    for run in [loose_piece(), sparse_points()] {
+        for ranks in [1, 2, 3] {
+            let outcome = run.clone().ranks(ranks).attempt();
+            assert_eq!(said(&outcome), SINGULAR, "on {ranks} ranks");
+            assert_eq!(outcome.code, 1, "on {ranks} ranks");
+        }
+    }
+}
+
+/// The failed solve leaves nothing behind that the next try would stumble over.
+#[test]
+fn a_singular_system_is_tried_again_in_smaller_steps() {
+    for ranks in [1, 2, 3] {
+        let run = loose_piece().set("analysis.on_failure=\"cut\"").ranks(ranks);
+        let outcome = run.set("analysis.smallest_step=0.2").attempt();
+        assert_eq!(outcome.code, 1, "{}", outcome.stderr);
+        assert_eq!(outcome.stdout.matches("step 1 refused").count(), 2, "{}", outcome.stdout);
+        assert_eq!(outcome.results().summary["status"], "stopped");
+    }
+}
+
+/// Solvers inside solvers that run on some ranks only.
+#[test]
+fn a_singular_system_fails_in_blocks_and_on_coarse_levels_too() {
+    for words in [
+        "-qs_ksp_type preonly -qs_pc_type bjacobi -qs_sub_pc_type lu",
+        "-qs_ksp_type cg -qs_pc_type bjacobi -qs_sub_pc_type lu",
+        "-qs_ksp_type preonly -qs_pc_type redundant",
+        "-qs_ksp_type cg -qs_pc_type mg -qs_ksp_max_it 40",
+    ] {
+        for ranks in [2, 3] {
+            let run = words.split(' ').fold(loose_piece(), |run, word| run.word(word));
+            let outcome = run.ranks(ranks).attempt();
+            assert_eq!(said(&outcome), SINGULAR, "{words} on {ranks} ranks");
+            assert_eq!(outcome.code, 1, "{words} on {ranks} ranks");
+        }
+    }
+}
+
+#[test]
+fn nonlinear_solvers_that_do_not_suit() {
+    for kind in ["ksponly", "qn", "aspin", "nrichardson"] {
+        let message = format!(
+            "error: -qs_snes_type {kind}: the equations are solved by newtonls or newtontr"
+        );
+        refused_on(&[1, 2], &with(&format!("-qs_snes_type {kind}")), &message);
+    }
+    refused(
+        &block().set("petsc={ qs_snes_type = \"qn\" }"),
+        "error: -qs_snes_type qn: the equations are solved by newtonls or newtontr",
+    );
+    for kind in ["newtonls", "newtontr"] {
+        with(&format!("-qs_snes_type {kind}")).ranks(2).results();
+    }
+}
+
+#[test]
+fn values_that_petsc_refuses() {
+    let message =
+        "error: PETSc does not accept -qs_ksp_rtol abc: Input string abc has no numeric value";
+    // Read by the run, or by none of its solvers; from the command line, or from the deck.
+    refused(&with("-qs_ksp_type cg -qs_pc_type jacobi -qs_ksp_rtol abc"), message);
+    refused(&with("-qs_ksp_rtol abc"), message);
+    refused(&block().set("petsc={ qs_ksp_rtol = \"abc\" }"), message);
+    refused(&with("-qs_ksp_max_it -5"), "error: -qs_ksp_max_it -5: expected a number >= 0");
+    refused(&with("-qs_pc_type lu -qs_pc_factor_mat_solver_type foo").word("--check"), "");
+}
+
+#[test]
+fn preconditioners_that_the_ranks_cannot_have() {
+    let words = "-qs_ksp_type gmres -qs_pc_type ilu";
+    refused_on(
+        &[2, 3],
+        &with(words),
+        "error: PETSc does not accept -qs_ksp_type gmres -qs_pc_type ilu: Could not locate a solver \
+         type for factorization type ILU and matrix type mpiaij.",
+    );
+    with(words).ranks(1).set("ghost.stiffness_factor=1.0").results();
+}
+
+#[test]
+fn files_of_options_that_cannot_be_read() {
+    refused(
+        &with("-options_file nowhere"),
+        "error: -options_file nowhere: cannot be read: No such file or directory (os error 2)",
+    );
+}
+
+#[test]
+fn files_that_viewers_cannot_write() {
+    for name in ["-log_view", "-qs_ksp_view", "-qs_ksp_monitor"] {
+        refused_on(
+            &[1, 2],
+            &with(&format!("{name} :nowhere/x")),
+            &format!(
+                "error: {name} :nowhere/x: cannot be written: No such file or directory (os error 2)"
+            ),
+        );
+    }
+    refused(
+        &block().set("petsc={ log_view = \":nowhere/x\" }"),
+        "error: -log_view :nowhere/x: cannot be written: No such file or directory (os error 2)",
+    );
+    for ranks in [1, 2] {
+        let outcome = with("-log_view :profile -qs_ksp_view :solver").ranks(ranks).attempt();
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        let files = outcome.files();
+        assert!(files.contains(&"profile".into()) && files.contains(&"solver".into()), "{files:?}");
+    }
+}
+
+/// What the trial of a file cannot foresee: one line, and all ranks end.
+#[test]
+fn files_that_fail_at_the_start_and_at_the_end() {
+    for (words, message) in [("-info :nowhere", ""), ("-log_view :link", "")] {
+        for ranks in [1, 2, 3] {
+            let folder = tempfile::tempdir().unwrap();
+            std::os::unix::fs::symlink("nowhere/x", folder.path().join("link")).unwrap();
+            let outcome = with(words).ranks(ranks).attempt_in(folder);
+            let expected = format!("error: PETSc {message}");
+            assert_eq!(said(&outcome), expected, "{words} on {ranks} ranks");
+            assert_eq!(outcome.code, 4, "{words} on {ranks} ranks");
+        }
+    }
+}
+
+/// Round-off is not healed by smaller steps.
+#[test]
+fn a_residual_at_round_off_is_told_to_raise_the_tolerance() {
+    for ranks in [1, 2] {
+        for (set, advice) in [
+            ("analysis.tolerance=1e-30", true),
+            ("load.0.gravity=[0, -1e-4]", true),
+            ("analysis.max_iterations=2", false),
+        ] {
+            let outcome = block().set(set).ranks(ranks).attempt();
+            let text = said(&outcome);
+            assert_eq!(outcome.code, 1, "{text}");
+            let found =
+                text.contains("try: raise analysis.tolerance: the residual no longer falls");
+            assert_eq!(found, advice, "{text}");
+            assert_eq!(text.contains("smaller steps"), !advice, "{text}");
+        }
+    }
+}
