@@ -150,6 +150,11 @@ fn nonlinear_solvers_that_do_not_suit() {
         &block().set("petsc={ qs_snes_type = \"qn\" }"),
         "error: -qs_snes_type qn: the equations are solved by newtonls or newtontr",
     );
+    refused_on(
+        &[1, 2],
+        &with("-qs_snes_lag_jacobian 2"),
+        "error: -qs_snes_lag_jacobian 2: the tangent is assembled with every residual",
+    );
     for kind in ["newtonls", "newtontr"] {
         with(&format!("-qs_snes_type {kind}")).ranks(2).results();
     }
@@ -208,6 +213,25 @@ fn files_that_viewers_cannot_write() {
         let files = outcome.files();
         assert!(files.contains(&"profile".into()) && files.contains(&"solver".into()), "{files:?}");
     }
+}
+
+/// Those of the run are looked at, and named.
+#[test]
+fn options_that_go_well_together_pass() {
+    for words in [
+        "-qs_ksp_type cg -qs_pc_type gamg",
+        "-qs_ksp_type gmres -qs_ksp_pc_side right -qs_pc_type asm -qs_sub_pc_type lu",
+        "-qs_pc_type cholesky -qs_mat_mumps_icntl_14 50 -mass_ksp_rtol 1e-10",
+    ] {
+        with(words).set("ghost.stiffness_factor=1.0").ranks(2).results();
+    }
+    refused_on(
+        &[1, 2],
+        &with("-qs_ksp_type cg -qs_pc_type mg -qs_mg_levels_pc_type sor"),
+        "error: PETSc does not accept -qs_ksp_type cg -qs_mg_levels_pc_type sor -qs_pc_type mg: SOR \
+         and Eisenstat's form of it need the entries of the matrix, and the levels of multigrid \
+         (pc_type mg) have only products: use mg_levels_pc_type jacobi, or pc_type gamg",
+    );
 }
 
 /// What the trial of a file cannot foresee: one line, and all ranks end.

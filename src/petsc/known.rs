@@ -107,6 +107,9 @@ const PRECONDITIONERS: [&str; 24] = [
     "hmg",
     "svd",
 ];
+/// They would solve with a matrix that the next residual has written into.
+const WITHOUT_TANGENT: [&str; 4] =
+    ["snes_lag_jacobian", "snes_lag_jacobian_persists", "snes_mf", "snes_mf_operator"];
 /// Limits of linear solvers that PETSc takes as they are.
 const NOT_NEGATIVE: [&str; 4] = ["ksp_max_it", "ksp_rtol", "ksp_atol", "ksp_divtol"];
 /// Nonlinear solvers that assemble and solve as [`super::snes`] needs it.
@@ -177,6 +180,9 @@ fn judge(name: &str, value: &str) -> Result<Answer> {
         let why = format!("the equations are solved by {}", NEWTON.join(" or "));
         return Ok(Answer::Unsuited(why));
     }
+    if WITHOUT_TANGENT.contains(&own) && !(own == "snes_lag_jacobian" && value == "1") {
+        return Ok(Answer::Unsuited("the tangent is assembled with every residual".into()));
+    }
     let base = without_nesting(own);
     if NOT_NEGATIVE.contains(&base) && value.parse().is_ok_and(|number: f64| number < 0.0) {
         return Ok(Answer::Unsuited("expected a number >= 0".into()));
@@ -196,6 +202,7 @@ pub(super) fn without_nesting(mut name: &str) -> &str {
             .or_else(|| {
                 name.strip_prefix("ksp_")
                     .filter(|rest| rest.starts_with("ksp_") || rest.starts_with("pc_"))
+                    .filter(|rest| *rest != "pc_side")
             });
         let Some(inner) = inner else { return name };
         let digits = inner.trim_start_matches(|c: char| c.is_ascii_digit());
@@ -324,6 +331,7 @@ mod tests {
             ("ksp_ksp_type", "ksp_type"),
             ("mg_levels_esteig_ksp_type", "ksp_type"),
             ("ksp_type", "ksp_type"),
+            ("ksp_pc_side", "ksp_pc_side"),
         ] {
             assert_eq!(without_nesting(name), base, "{name}");
         }
