@@ -115,7 +115,7 @@ fn a_singular_system_is_tried_again_in_smaller_steps() {
         let run = loose_piece().set("analysis.on_failure=\"cut\"").ranks(ranks);
         let outcome = run.set("analysis.smallest_step=0.2").attempt();
         assert_eq!(outcome.code, 1, "{}", outcome.stderr);
-        assert_eq!(outcome.stdout.matches("step 1 refused").count(), 2, "{}", outcome.stdout);
+        assert_eq!(outcome.stdout.matches("step 1 refused").count(), 3, "{}", outcome.stdout);
         assert_eq!(outcome.results().summary["status"], "stopped");
     }
 }
@@ -166,10 +166,24 @@ fn values_that_petsc_refuses() {
         "error: PETSc does not accept -qs_ksp_rtol abc: Input string abc has no numeric value";
     // Read by the run, or by none of its solvers; from the command line, or from the deck.
     refused(&with("-qs_ksp_type cg -qs_pc_type jacobi -qs_ksp_rtol abc"), message);
-    refused(&with("-qs_ksp_rtol abc"), message);
-    refused(&block().set("petsc={ qs_ksp_rtol = \"abc\" }"), message);
-    refused(&with("-qs_ksp_max_it -5"), "error: -qs_ksp_max_it -5: expected a number >= 0");
-    refused(&with("-qs_pc_type lu -qs_pc_factor_mat_solver_type foo").word("--check"), "");
+    refused_on(&[1, 2], &with("-qs_ksp_rtol abc"), message);
+    refused_on(&[1, 2], &block().set("petsc={ qs_ksp_rtol = \"abc\" }"), message);
+    refused_on(
+        &[1, 2],
+        &with("-qs_ksp_max_it -5"),
+        "error: -qs_ksp_max_it -5: expected a number >= 0",
+    );
+    for (ranks, matrix) in [(1, "seqaij"), (2, "mpiaij")] {
+        refused_on(
+            &[ranks],
+            &with("-qs_pc_type lu -qs_pc_factor_mat_solver_type foo"),
+            &format!(
+                "error: PETSc does not accept -qs_pc_factor_mat_solver_type foo -qs_pc_type lu: \
+                 Could not locate solver type foo for factorization type LU and matrix type \
+                 {matrix}. Perhaps you must ./configure with --download-foo"
+            ),
+        );
+    }
 }
 
 #[test]
@@ -237,7 +251,10 @@ fn options_that_go_well_together_pass() {
 /// What the trial of a file cannot foresee: one line, and all ranks end.
 #[test]
 fn files_that_fail_at_the_start_and_at_the_end() {
-    for (words, message) in [("-info :nowhere", ""), ("-log_view :link", "")] {
+    for (words, message) in [
+        ("-info nowhere/x", "could not be started: Unable to open file nowhere/x.0"),
+        ("-log_view :link", "could not be ended in order: Cannot open PetscViewer file: link"),
+    ] {
         for ranks in [1, 2, 3] {
             let folder = tempfile::tempdir().unwrap();
             std::os::unix::fs::symlink("nowhere/x", folder.path().join("link")).unwrap();
