@@ -7,6 +7,7 @@
 //! | `schema/` | every key once: type, unit, default, range, meaning |
 //! | `tree.rs` | TOML to values with their places; `--set` |
 //! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |
+//! | `places.rs` | where each key is written, for faults seen later |
 //! | `sections/` | each section's values and the checks across sections |
 //! | `resolved.rs` | the deck with every default, as TOML |
 //! | `physics.rs` | the part that a continued run must share |
@@ -17,6 +18,7 @@ pub mod expression;
 pub mod fields;
 pub mod model;
 pub mod physics;
+mod places;
 mod problems;
 mod reader;
 pub mod reference;
@@ -31,6 +33,8 @@ use std::path::{Path, PathBuf};
 
 pub use expression::{Expression, Scope};
 pub use model::Deck;
+pub use places::Places;
+pub use problems::{figure, nearest};
 pub use resolved::resolved;
 pub use shape::Shape;
 
@@ -66,7 +70,9 @@ fn checked(
         tree::apply_set(&mut root, option, index)
             .map_err(|why| problems.report(&Origin::Set(index), "", why, String::new()))?;
     }
-    sections::deck(problems, &root, &directory(path))
+    let mut deck = sections::deck(problems, &root, &directory(path))?;
+    deck.places = problems.places(&root);
+    Ok(deck)
 }
 
 /// Folder of the deck, absolute so that the resolved deck works from anywhere.

@@ -6,6 +6,7 @@
 use std::path::PathBuf;
 
 use super::expression::Expression;
+use super::places::Places;
 use super::shape::Shape;
 
 /// A complete, checked input deck.
@@ -31,6 +32,8 @@ pub struct Deck {
     pub conditioning_displacement: Option<Vec<f64>>,
     /// `[petsc]`: option name without its dash, and value ("" for a bare flag).
     pub petsc: Vec<(String, String)>,
+    /// Where the keys are written.
+    pub places: Places,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,6 +42,13 @@ pub enum AnalysisType {
     Explicit,
     ImplicitDynamic,
     Conditioning,
+}
+
+impl AnalysisType {
+    /// Whether there is a time `t`, or only the load factor `s`.
+    pub fn has_time(self) -> bool {
+        matches!(self, AnalysisType::Explicit | AnalysisType::ImplicitDynamic)
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]

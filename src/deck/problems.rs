@@ -2,7 +2,8 @@
 
 use std::cell::RefCell;
 
-use super::tree::Origin;
+use super::places::Places;
+use super::tree::{Node, Origin};
 use crate::error::Error;
 
 /// Problems shown at once.
@@ -56,6 +57,11 @@ impl<'a> Problems<'a> {
         Reported
     }
 
+    /// Where the keys below `root` are written.
+    pub fn places(&self, root: &Node) -> Places {
+        Places::of(root, |origin| self.sources.mark(origin))
+    }
+
     /// The problems as one error, if there are any.
     pub fn into_error(self) -> Option<Error> {
         let mut found = self.found.into_inner();
@@ -84,12 +90,22 @@ impl Sources<'_> {
             "" => String::new(),
             key => format!("{key}: "),
         };
-        let message = &problem.message;
-        let mut out = match &problem.origin {
-            Origin::Nowhere => format!("{}: {key}{message}", self.file),
+        let (place, lines) = self.mark(&problem.origin);
+        let mut out = format!("{place}: {key}{}{lines}", problem.message);
+        for line in problem.help.lines() {
+            out.push_str("\n   = ");
+            out.push_str(line);
+        }
+        out
+    }
+
+    /// What a message about `origin` begins with, and the lines of text that follow it.
+    fn mark(&self, origin: &Origin) -> (String, String) {
+        match origin {
+            Origin::Nowhere => (self.file.clone(), String::new()),
             Origin::Set(index) => {
                 let option = self.sets.get(*index).map_or("", String::as_str);
-                format!("--set {option}: {key}{message}")
+                (format!("--set {option}"), String::new())
             }
             Origin::Text(span) => {
                 let (line, column, content) = self.locate(span.start);
@@ -102,18 +118,13 @@ impl Sources<'_> {
                     .take(column - 1)
                     .map(|c| if c == '\t' { '\t' } else { ' ' })
                     .collect();
-                format!(
-                    "{}:{line}:{column}: {key}{message}\n {margin} |\n {number} | {content}\n {margin} | {indent}{}",
-                    self.file,
-                    "^".repeat(marked)
+                let carets = "^".repeat(marked);
+                (
+                    format!("{}:{line}:{column}", self.file),
+                    format!("\n {margin} |\n {number} | {content}\n {margin} | {indent}{carets}"),
                 )
             }
-        };
-        for line in problem.help.lines() {
-            out.push_str("\n   = ");
-            out.push_str(line);
         }
-        out
     }
 
     /// Line and column from one, and the line itself.
@@ -125,6 +136,16 @@ impl Sources<'_> {
         let column = before[start..].chars().count() + 1;
         let content = self.text[start..].lines().next().unwrap_or("");
         (line, column, content)
+    }
+}
+
+/// A number in a message: as people write it, by its power of ten where that would take too many
+/// digits.
+pub fn figure(value: f64) -> String {
+    match value.abs() {
+        0.0 => "0".to_string(),
+        size if (1e-5..1e15).contains(&size) => value.to_string(),
+        _ => format!("{value:e}"),
     }
 }
 

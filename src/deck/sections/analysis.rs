@@ -57,7 +57,7 @@ pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
 
 /// Which of steps, duration and cfl the kind of analysis takes.
 fn timing(table: &Table<'_>, kind: AnalysisType) -> Got<()> {
-    let dynamic = matches!(kind, AnalysisType::Explicit | AnalysisType::ImplicitDynamic);
+    let dynamic = kind.has_time();
     let name = kind.name();
     let mut result = Ok(());
     if dynamic && !table.given("duration") {

@@ -8,7 +8,7 @@ use crate::deck::model::{
     Analysis, AnalysisType, Basis, Body, BodySource, Grid, LatticeGrid, Material, MaterialModel,
     MeshMotion, MeshSource, Method, Seeding,
 };
-use crate::deck::problems::Got;
+use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema::AXES;
 use crate::deck::tree::Value;
@@ -154,7 +154,11 @@ fn source(body: &Table<'_>, shape: &Table<'_>, world: &World<'_>) -> Got<BodySou
                     "",
                     format!(
                         "the body lies outside the grid: {} from {} to {} m, the grid from {} to {} m",
-                        AXES[axis], low[axis], high[axis], min[axis], max[axis]
+                        AXES[axis],
+                        figure(low[axis]),
+                        figure(high[axis]),
+                        figure(min[axis]),
+                        figure(max[axis])
                     ),
                 ));
             }
@@ -224,7 +228,9 @@ fn domain_fits(lattice: &Table<'_>, spacing: f64, world: &World<'_>) -> Got<()> 
         return Err(lattice.problem(
             "spacing",
             format!(
-                "expected at most the cell size {smallest} m: with basis = \"gimp\" a domain may not be larger than a cell, found {spacing} m"
+                "expected at most the cell size {} m: with basis = \"gimp\" a domain may not be larger than a cell, found {} m",
+                figure(smallest),
+                figure(spacing)
             ),
         ));
     }

@@ -6,7 +6,7 @@ use crate::deck::model::{
     Basis, BodySource, Boundary, Deck, Element, Grid, LatticeGrid, MeshGrid, MeshMotion,
     MeshSource, Method, Place, Seeding,
 };
-use crate::deck::problems::Got;
+use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, POSITIVE};
 use crate::deck::tree::Value;
@@ -81,15 +81,26 @@ fn whole_cells(table: &Table<'_>, axis: usize, size: f64, h: f64) -> Got<usize> 
     }
     let (fewer, more) = (cells.floor().max(1.0), cells.ceil().max(1.0));
     let near = if fewer == more {
-        format!("{}", fewer * h)
+        figure(fewer * h)
     } else {
-        format!("{} or {}", fewer * h, more * h)
+        format!("{} or {}", figure(fewer * h), figure(more * h))
     };
+    let count = if (1e-5..1e15).contains(&cells) { format!("{cells:.6}") } else { figure(cells) };
+    if whole >= 1e15 {
+        let (size, h) = (figure(size), figure(h));
+        let message = format!(
+            "{size} m along {} with h = {h} m is {count} cells, more than can be numbered",
+            AXES[axis]
+        );
+        return Err(table.problem("size", message));
+    }
     Err(table.problem(
         "size",
         format!(
-            "expected whole cells, found {size} m along {} with h = {h} m, which is {cells:.6} cells; nearest: {near} m",
-            AXES[axis]
+            "expected whole cells, found {} m along {} with h = {} m, which is {count} cells; nearest: {near} m",
+            figure(size),
+            AXES[axis],
+            figure(h)
         ),
     ))
 }
@@ -127,7 +138,11 @@ fn annulus_of(table: &Table<'_>) -> Got<MeshSource> {
     let (inner, outer) = (inner?, outer?);
     let widest = inner[0].max(inner[1]);
     if widest >= outer {
-        let message = format!("expected a hole smaller than outer = {outer} m, found {widest} m");
+        let message = format!(
+            "expected a hole smaller than outer = {} m, found {} m",
+            figure(outer),
+            figure(widest)
+        );
         return Err(table.problem("inner", message));
     }
     let element = if element? == 0 { Element::Quad4 } else { Element::Tri3 };

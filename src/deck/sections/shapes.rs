@@ -1,6 +1,6 @@
 //! `body.shape`: forms and where they are put.
 
-use crate::deck::problems::Got;
+use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema;
 use crate::deck::shape::{Form, Placement, Shape, Turn};
@@ -85,9 +85,9 @@ pub fn corners(table: &Table<'_>, dimension: usize, flat: bool) -> Got<(Vec<f64>
                 "max",
                 format!(
                     "expected {relation} min = {} along {}, found {}",
-                    min[axis],
+                    figure(min[axis]),
                     schema::AXES[axis],
-                    max[axis]
+                    figure(max[axis])
                 ),
             ));
         }
