@@ -2,58 +2,64 @@
 
 use std::path::Path;
 
-use crate::deck::model::Body;
+use crate::deck::model::{Basis, Body, Deck};
+use crate::deck::{figure, nearest};
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 
 use super::Points;
 use super::share::Share;
 
+/// By how much a GIMP domain may exceed a cell: six digits of a volume.
+const SLACK: f64 = 1e-6;
+
 /// Reads this rank's share of the lines; the domain of each point is a square (cube) of its
-/// volume. Returns the number of lines.
+/// volume. Returns the number of lines. Errors name file and line; one of a file that cannot be
+/// read names the deck's.
 pub fn read_points<const D: usize>(
     points: &mut Points<D>,
+    deck: &Deck,
     index: usize,
-    body: &Body,
+    grid: &Grid<D>,
     path: &Path,
     share: Share,
     first_id: u64,
 ) -> Result<u64> {
-    let wrong = |line: u64, what: String| {
-        Error::Input(format!(
-            "{}:{line}: {what} (points of body \"{}\")",
-            path.display(),
-            body.name
-        ))
+    let body = &deck.bodies[index];
+    let unreadable = |error: csv::Error| {
+        let reason = match error.kind() {
+            csv::ErrorKind::Io(reason) => reason.to_string(),
+            _ => error.to_string(),
+        };
+        let key = format!("body.{index}.shape.points");
+        let message = format!("cannot read {}: {reason}", path.display());
+        Error::Input(deck.places.say(&key, &message))
     };
+    let wrong = |line: u64, what: String| at(path, body, line, &what);
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
         .from_path(path)
-        .map_err(|error| wrong(1, error.to_string()))?;
-    let headers = reader.headers().map_err(|error| wrong(1, error.to_string()))?.clone();
-    let column = |name: &str| headers.iter().position(|header| header == name);
-    let needed = |name: &str| {
-        column(name).ok_or_else(|| {
-            wrong(
-                1,
-                format!(
-                    "no column \"{name}\"; the header must read {},volume and may add vx,vy{}",
-                    &"x,y,z"[..2 * D - 1],
-                    if D == 3 { ",vz" } else { "" }
-                ),
-            )
-        })
+        .map_err(unreadable)?;
+    let headers = match reader.headers() {
+        Ok(headers) => headers.clone(),
+        Err(error) if error.is_io_error() => return Err(unreadable(error)),
+        Err(error) => return Err(wrong(1, error.to_string())),
     };
-    let axes = ["x", "y", "z"];
-    let places: Vec<usize> = axes[..D].iter().map(|name| needed(name)).collect::<Result<_>>()?;
-    let volume_column = needed("volume")?;
-    let speeds: Vec<Option<usize>> =
-        ["vx", "vy", "vz"][..D].iter().map(|name| column(name)).collect();
+    let line = headers.position().map_or(1, csv::Position::line);
+    let columns = Columns::find::<D>(&headers).map_err(|what| wrong(line, what))?;
+    let widest = match grid {
+        Grid::Lattice(lattice) if deck.method.basis == Basis::Gimp => {
+            lattice.spacing.iter().copied().fold(f64::INFINITY, f64::min)
+        }
+        _ => f64::INFINITY,
+    };
 
     let mut rows = Vec::new();
     for record in reader.records() {
-        let record = record.map_err(|error| {
-            wrong(error.position().map_or(0, csv::Position::line), error.to_string())
+        let record = record.map_err(|error| match error.position() {
+            Some(position) => wrong(position.line(), error.to_string()),
+            None => unreadable(error),
         })?;
         let line = record.position().map_or(0, csv::Position::line);
         let number = |at: usize| -> Result<f64> {
@@ -63,20 +69,34 @@ pub fn read_points<const D: usize>(
             })
         };
         let mut x = [0.0; D];
-        for (value, &at) in x.iter_mut().zip(&places) {
+        for (value, &at) in x.iter_mut().zip(&columns.places) {
             *value = number(at)?;
         }
-        let volume = number(volume_column)?;
+        let volume = number(columns.volume)?;
         if volume <= 0.0 {
             return Err(wrong(line, format!("volume {volume} must be positive")));
         }
+        let width = volume.powf(1.0 / D as f64);
+        if width > widest * (1.0 + SLACK) {
+            let what = format!(
+                "volume {} is that of a domain of width {} m, expected at most the cell size {} \
+                 m: with basis = \"gimp\" a domain may not be larger than a cell",
+                figure(volume),
+                figure(width),
+                figure(widest)
+            );
+            return Err(wrong(line, what));
+        }
         let mut velocity = [0.0; D];
-        for (value, at) in velocity.iter_mut().zip(&speeds) {
+        for (value, at) in velocity.iter_mut().zip(&columns.speeds) {
             if let Some(at) = at {
                 *value = number(*at)?;
             }
         }
         rows.push((x, volume, velocity));
+    }
+    if rows.is_empty() {
+        return Err(wrong(line, "a header and no points".to_string()));
     }
     for row in share.of(rows.len()) {
         let (x, volume, velocity) = rows[row];
@@ -86,4 +106,49 @@ pub fn read_points<const D: usize>(
         *points.velocity.last_mut().expect("a point was just pushed") = velocity;
     }
     Ok(rows.len() as u64)
+}
+
+fn at(path: &Path, body: &Body, line: u64, what: &str) -> Error {
+    Error::Input(format!("{}:{line}: {what} (points of body \"{}\")", path.display(), body.name))
+}
+
+/// Where in a line the values are.
+struct Columns {
+    places: Vec<usize>,
+    volume: usize,
+    speeds: Vec<Option<usize>>,
+}
+
+impl Columns {
+    /// Error: a column that is missing, unknown or there twice.
+    fn find<const D: usize>(headers: &csv::StringRecord) -> std::result::Result<Self, String> {
+        let (axes, rates) = (&["x", "y", "z"][..D], &["vx", "vy", "vz"][..D]);
+        let expected = format!(
+            "the header must read {},volume and may add {}",
+            axes.join(","),
+            rates.join(",")
+        );
+        let known = || axes.iter().chain(&["volume"]).chain(rates).copied();
+        for (at, name) in headers.iter().enumerate() {
+            if !known().any(|column| column == name) {
+                let hint = match (D, name, nearest(name, known())) {
+                    (2, "z" | "vz", _) => " (the problem is 2D)".to_string(),
+                    (_, _, Some(near)) => format!(", did you mean \"{near}\"?"),
+                    _ => String::new(),
+                };
+                return Err(format!("unknown column \"{name}\"{hint}; {expected}"));
+            }
+            if headers.iter().take(at).any(|earlier| earlier == name) {
+                return Err(format!("column \"{name}\" is there twice; {expected}"));
+            }
+        }
+        let column = |name: &str| headers.iter().position(|header| header == name);
+        let needed =
+            |name: &str| column(name).ok_or_else(|| format!("no column \"{name}\"; {expected}"));
+        Ok(Columns {
+            places: axes.iter().map(|name| needed(name)).collect::<std::result::Result<_, _>>()?,
+            volume: needed("volume")?,
+            speeds: rates.iter().map(|name| column(name)).collect(),
+        })
+    }
 }

@@ -25,7 +25,7 @@ pub fn seed<const D: usize>(
         first_ids.push(first_id);
         let candidates = match (&body.source, grid) {
             (BodySource::File(path), _) => {
-                super::file::read_points(&mut points, index, body, path, share, first_id)?
+                super::file::read_points(&mut points, deck, index, grid, path, share, first_id)?
             }
             (BodySource::Shape { shape, seeding: Seeding::Lattice { spacing, offset } }, _) => {
                 on_lattice(&mut points, index, body, shape, *spacing, offset, share, first_id)?
@@ -54,7 +54,10 @@ pub fn seed<const D: usize>(
             }
         };
         first_id += candidates;
-        set_velocity(&mut points, made, body);
+        // A file may have velocities of its own.
+        if !matches!(body.source, BodySource::File(_)) || moves(body) {
+            set_velocity(&mut points, made, body);
+        }
     }
     Ok((points, first_ids))
 }
@@ -254,6 +257,11 @@ fn mark_outermost<const D: usize>(
         })
     });
     *points.outermost.last_mut().expect("a point was just pushed") = f64::from(u8::from(outermost));
+}
+
+/// Whether the deck gives the body a velocity.
+fn moves(body: &Body) -> bool {
+    body.velocity.iter().any(|component| component.as_constant() != Some(0.0))
 }
 
 fn set_velocity<const D: usize>(points: &mut Points<D>, from: usize, body: &Body) {
