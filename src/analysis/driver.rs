@@ -221,7 +221,7 @@ impl Run<'_> {
                 (Ending::failed(text), kind)
             }
         };
-        let figures = quasi_static::figures(world, &model, &points, &recorder)?;
+        let figures = quasi_static::figures(world, &model, &points, &mut recorder)?;
         let (traffic, steps) = (clock.traffic(), recorder.steps_here());
         let sent = balance::communication(world, &model, traffic, steps);
         let (summary, written) =

@@ -249,19 +249,23 @@ pub fn work_of_step<const D: usize>(
         .sum()
 }
 
-/// Figures of merit at the end of the run. Collective.
+/// Figures of merit at the end of the run; the log tells which have no value. Collective.
 pub fn figures<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
-    recorder: &Recorder,
+    recorder: &mut Recorder,
 ) -> Result<std::collections::BTreeMap<String, f64>> {
     let (factor, time) = recorder.reached;
     let mut figures = verify::figures(world, &model.deck.verify, points, factor, time)?;
     if let Some(field) = &model.manufactured {
-        figures.extend(verify::manufactured(world, field, &model.materials, points, factor, time)?);
+        let materials = &model.materials;
+        verify::manufactured(&mut figures, world, field, materials, points, factor, time);
     }
-    Ok(figures)
+    for warning in &figures.warnings {
+        recorder.log.say(warning);
+    }
+    Ok(figures.values)
 }
 
 /// A run that failed, as the error the command line reports.
