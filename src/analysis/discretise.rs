@@ -300,7 +300,7 @@ fn append_nodes<const D: usize>(
 }
 
 /// The Ghost faces owned here and the cells beside them.
-fn find_faces<const D: usize>(
+pub(super) fn find_faces<const D: usize>(
     world: &World,
     model: &Model<D>,
     populated: &Populated,

@@ -24,8 +24,8 @@ use crate::petsc::{files, known};
 use super::checkpointing::{self, Checkpointer};
 use super::clock::Clock;
 use super::recorder::{Ending, Recorder, Resume};
-use super::{balance, conditioning, discretise, explicit, implicit_dynamic, quasi_static};
-use super::{plan, process, setup, solver, support};
+use super::{balance, conditioning, discretise, explicit, first_state, implicit_dynamic};
+use super::{plan, process, quasi_static, setup, solver, support};
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
@@ -152,12 +152,17 @@ impl Run<'_> {
             }
         };
         let active = discretise::active(world, &model, &points)?;
+        let warnings = match resume {
+            None => first_state::check(world, &model, &points, &active.1)?,
+            Some(_) => Vec::new(),
+        };
         if resume.is_none() && model.deck.analysis.kind == AnalysisType::QuasiStatic {
             let first = quasi_static::first_span(&model.deck);
             support::require(world, &model, &points, &active, first)?;
         }
         let plan = plan::of(world, &model, &points, &active);
         self.log.say(&report::plan(&plan));
+        warnings.iter().for_each(|warning| self.log.say(warning));
         drop(active);
         solver::rehearse(world, &model, plan.equations)?;
         if self.arguments.check {
@@ -250,7 +255,7 @@ impl Run<'_> {
             what: ending.reason.clone(),
             last_good_step: Some(recorder.steps_completed),
             results: Some(recorder.directory()),
-            // Whoever sent a signal needs no advice, and no numerics heals a full disk or an
+            // Whoever sent a signal needs no advice, and no numerics heals a deck, a full disk or an
             // option that PETSc refuses.
             advice: match kind(String::new()).exit_code() {
                 _ if ending.on_request => Vec::new(),

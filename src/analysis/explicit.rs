@@ -59,8 +59,11 @@ pub fn run<const D: usize>(
         before.record(points, model.deck.method.basis);
         let (mut solved, sums) = match advance(world, model, points, clock, span) {
             Ok(done) => done,
-            Err(Halt::Failed(error)) if !matches!(error, Error::Run(_)) => return Err(error),
+            Err(Halt::Failed(error)) if !matches!(error, Error::Run(_) | Error::Input(_)) => {
+                return Err(error);
+            }
             Err(halt) => {
+                let of_deck = matches!(halt, Halt::Failed(Error::Input(_)));
                 let (why, inverted) = match halt {
                     Halt::Refused(refusal) => (refusal.why, refusal.inverted),
                     Halt::Failed(error) => (error.to_string(), false),
@@ -71,7 +74,8 @@ pub fn run<const D: usize>(
                 let (time, state) = (span.time_start, state_of(&steps, &ledger));
                 step_end::leave(world, model, points, recorder, framed, number - 1, time, state)?;
                 let hint = if inverted { unstabilised(model) } else { "" };
-                return Ok(Ending::failed(at(&format!("{why}{detail}{hint}"))));
+                let text = at(&format!("{why}{detail}{hint}"));
+                return if of_deck { Err(Error::Input(text)) } else { Ok(Ending::failed(text)) };
             }
         };
         let entry = Entry::unite(world, points, sums);

@@ -94,6 +94,7 @@ pub fn run<const D: usize>(
             }
             Ok(Err(why)) => Err(Fault::Step(why)),
             Err(Error::Run(why)) => Err(Fault::Final(why)),
+            Err(Error::Input(why)) => Err(Fault::Deck(why)),
             Err(other) => return Err(other),
         };
         let Step { mut solved, ghost_work, .. } = match outcome {
@@ -113,16 +114,20 @@ pub fn run<const D: usize>(
                 let time = span.time_start;
                 step_end::leave(world, model, points, recorder, framed, completed, time, state)?;
                 let end = format!("t = {:.6e} s", span.time_end);
-                return Ok(match fault {
-                    Fault::Step(why) => Ending::stopped(format!(
+                return match fault {
+                    Fault::Step(why) => Ok(Ending::stopped(format!(
                         "step {number} of {steps} ({end}) could not be solved: {why}{culprit}; the \
                          last finished step is {completed}"
-                    )),
-                    Fault::Final(why) => Ending::failed(format!(
+                    ))),
+                    Fault::Final(why) => Ok(Ending::failed(format!(
                         "step {number} of {steps} ({end}): {why}{culprit}; the last finished step \
                          is {completed}"
-                    )),
-                });
+                    ))),
+                    Fault::Deck(why) => Err(Error::Input(format!(
+                        "step {number} of {steps} ({end}): {why}; the last finished step is \
+                         {completed}"
+                    ))),
+                };
             }
         };
         let moment = stepping.accept();
@@ -148,6 +153,8 @@ enum Fault {
     /// A smaller one may be.
     Step(String),
     Final(String),
+    /// A formula of the deck has no value.
+    Deck(String),
 }
 
 /// A step as it was solved; its row lacks the ledger's columns.

@@ -11,7 +11,9 @@
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
-//! | rigid motions held? | `support.rs` | |
+//! | does it fit into the machine? | `room.rs` | |
+//! | formulas without a value, conditions on nothing? | `first_state.rs` | |
+//! | rigid motions of every piece held? | `support.rs`, `pieces.rs` | |
 //! | locate, map and number: the grid side of a step | `discretise.rs` (`grid/locate.rs`) | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs`, `linear_terms.rs` | Lagrangian eq. 26-30, 40 |
 //! | Newton's method for a step | `newton.rs` | |
@@ -38,6 +40,7 @@ pub mod explicit;
 mod explicit_nodes;
 mod explicit_step;
 pub mod extremes;
+pub mod first_state;
 pub mod grid_mass;
 pub mod implicit_dynamic;
 pub mod ledger;
@@ -47,11 +50,13 @@ pub mod motion;
 pub mod newmark;
 pub mod newton;
 mod nodal_sums;
+pub mod pieces;
 pub mod plan;
 mod process;
 pub mod quasi_static;
 pub mod reactions;
 pub mod recorder;
+mod room;
 pub mod setup;
 pub mod solver;
 pub mod step_end;

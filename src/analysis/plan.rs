@@ -38,14 +38,16 @@ pub fn of<const D: usize>(
         points_per_rank: world.sum_slice(&per_rank).into_iter().map(|n| n as usize).collect(),
         imbalance: imbalance(world, points.len()),
         cut_faces: None,
-        estimated_memory: Some(memory::<D>(deck.method.basis, all_points, nodes)),
+        estimated_memory: Some(
+            memory::<D>(deck.method.basis, all_points as f64, nodes as f64) as u64
+        ),
         estimated_output: Some((frames * all_points * output_bytes_per_point(deck)) as u64),
     }
 }
 
 /// Points with their influences, and the matrix three times over (ours, PETSc's two parts and
-/// its preconditioner), bytes.
-fn memory<const D: usize>(basis: Basis, points: usize, nodes: usize) -> u64 {
+/// its preconditioner), bytes. The counts may be estimates, too.
+pub(super) fn memory<const D: usize>(basis: Basis, points: f64, nodes: f64) -> f64 {
     let (nodes_each, row) = match (basis, D) {
         (Basis::Mpm, 2) => (4, 9),
         (Basis::Mpm, _) => (8, 27),
@@ -57,7 +59,7 @@ fn memory<const D: usize>(basis: Basis, points: usize, nodes: usize) -> u64 {
     let corners = if matches!(basis, Basis::Mpm | Basis::Gimp) { 8 * D } else { 0 };
     let per_point = 8 * (Points::<D>::record_words() - corners) + nodes_each * (16 + 8 * D);
     let per_node = row * (8 * D * D * 3 + 8);
-    (points * per_point + nodes * per_node) as u64
+    points * per_point as f64 + nodes * per_node as f64
 }
 
 /// Three numbers a field on the average, beside position and identity.

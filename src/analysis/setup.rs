@@ -2,8 +2,8 @@
 //! or the same from a checkpoint.
 
 use crate::assembly::manufactured::Manufactured;
-use crate::deck::Deck;
 use crate::deck::model::{self, Initial, Load};
+use crate::deck::{Deck, figure};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
@@ -16,9 +16,11 @@ use crate::points::share::Share;
 
 use super::balance::Balance;
 use super::discretise::Model;
+use super::room;
 
 /// Builds the model and this rank's points. Collective.
 pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {
+    room::require::<D>(world, &deck)?;
     let grid = world.fail_together(build_grid(&deck))?;
     check_tags(&deck, &grid)?;
     let share = Share { rank: world.rank(), ranks: world.size() };
@@ -31,7 +33,7 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     };
     let seeding = CellByCell::new(&deck, &grid, first_ids)?;
     parallel::settle(world, &partition, &grid, &mut points, cells, &seeding)?;
-    place_point_forces(world, &deck, &mut points)?;
+    place_point_forces(world, &deck, &grid, &mut points)?;
     Ok((model_of(deck, grid, partition)?, points))
 }
 
@@ -150,13 +152,15 @@ fn check_bodies<const D: usize>(
 }
 
 /// Shares each point load equally among the points nearest to its places; of points equally
-/// near (to 1e-9 of the distance scale) the one with the smallest id takes it.
+/// near (to 1e-9 of the distance scale) the one with the smallest id takes it. Error: a place further
+/// from all points than the diagonal of a cell and half that of the point's domain.
 fn place_point_forces<const D: usize>(
     world: &World,
     deck: &Deck,
+    grid: &Grid<D>,
     points: &mut Points<D>,
 ) -> Result<()> {
-    for load in &deck.loads {
+    for (index, load) in deck.loads.iter().enumerate() {
         let Load::Point { body, nearest, force } = load else { continue };
         for place in nearest {
             let distance = |p: usize| -> f64 {
@@ -174,7 +178,26 @@ fn place_point_forces<const D: usize>(
                 .min()
                 .unwrap_or(u64::MAX);
             let id = world.min_u64(id);
-            if let Some(p) = (0..points.len()).find(|&p| points.id[p] == id) {
+            let found = (0..points.len()).find(|&p| points.id[p] == id);
+            let far = found.and_then(|p| {
+                let half = points.half_length_initial[p].iter().copied().fold(0.0, f64::max);
+                let reach = (D as f64).sqrt() * (grid.cell_size() + half);
+                (best > reach).then(|| {
+                    format!(
+                        "{place:?} m is {} m away from the nearest point of body \"{}\", which is \
+                         at {:?} m; expected a place within a cell of it ({} m)",
+                        figure(best),
+                        deck.bodies[*body].name,
+                        points.position_initial[p],
+                        figure(reach)
+                    )
+                })
+            });
+            if let Some(message) = world.first_message(far) {
+                let key = format!("load.{index}.point.nearest");
+                return Err(Error::Input(deck.places.say(&key, &message)));
+            }
+            if let Some(p) = found {
                 for (held, f) in points.point_force[p].iter_mut().zip(force) {
                     *held += f / nearest.len() as f64;
                 }

@@ -1,26 +1,30 @@
-//! Do the conditions hold every body against rigid motion? Found before anything is solved or
-//! written: a quasi-static system that a rigid motion solves is singular.
+//! Do the conditions hold every connected piece of the material against rigid motion? Found before
+//! anything is solved or written: a quasi-static system that a rigid motion solves is singular.
+
+use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::numbering::Touched;
 use crate::assembly::{Numbering, Populated};
+use crate::basis;
 use crate::error::{Error, Result};
-use crate::grid::Grid;
-use crate::parallel::World;
+use crate::ghost::FaceStencil;
+use crate::parallel::{World, exchange};
 use crate::points::Points;
 
-use super::discretise::Model;
+use super::discretise::{self, Model};
+use super::pieces;
 
 /// Share of the largest eigenvalue below which a motion counts as free. The rows are exact but
 /// for rounding; a held line of a thousandth of the body's length leaves 1e-6.
 const FREE: f64 = 1e-12;
 
-/// An error that names the body and the motion. Bodies that share nodes hold each other. Every
-/// held component of a node is a row of the rigid motions' values there; the motions that all
-/// rows annihilate are free. The cells and nodes are those of [`super::discretise::active`].
-/// Collective.
+/// An error that names the body and the motion, and a point where it is of a piece alone. Every
+/// held component of a node is a row of the rigid motions' values there; the motions that all rows
+/// of a piece annihilate are free. Each piece is judged by the rank that owns its first node. The
+/// cells and nodes are those of [`super::discretise::active`]. Collective.
 pub fn require<const D: usize>(
     world: &World,
     model: &Model<D>,
@@ -28,8 +32,12 @@ pub fn require<const D: usize>(
     (populated, nodes): &(Populated, Touched),
     first: StepSpan,
 ) -> Result<()> {
-    let (deck, grid) = (&model.deck, &model.grid);
-    let numbering = Numbering::build(world, nodes.owned.clone(), &nodes.foreign)?;
+    let (deck, grid, partition) = (&model.deck, &model.grid, &model.partition);
+    let faces = ties(world, model, populated)?;
+    let known = nodes.owned.iter().chain(nodes.foreign.iter().map(|(_, node)| node));
+    let tied = faces.iter().flat_map(|face| &face.nodes);
+    let nodes = Touched::settle(world, grid, partition, known.chain(tied).copied().collect())?;
+    let numbering = Numbering::build(world, nodes.owned, &nodes.foreign)?;
     let conditions = Conditions::evaluate(
         world,
         grid,
@@ -39,93 +47,115 @@ pub fn require<const D: usize>(
         &deck.boundaries,
         first,
     )?;
-    let bodies = deck.bodies.len();
-    let touched = touched_nodes(world, grid, populated, &numbering, bodies)?;
-    let groups = sharing(world, &touched, bodies);
+    let pieces = pieces::labels(world, grid, populated, &faces, &numbering)?;
     let (middle, length) = extent(world, points);
     let motions = D + D * (D - 1) / 2;
-    for (lead, _) in groups.iter().enumerate().filter(|(body, group)| body == *group) {
-        let mut gram = vec![0.0; motions * motions];
-        for (local, bodies) in touched.iter().enumerate() {
-            if !bodies.iter().zip(&groups).any(|(&on, &group)| on && group == lead) {
-                continue;
-            }
-            let x = grid.node_position(numbering.nodes[local]);
-            let x: [f64; D] = std::array::from_fn(|a| (x[a] - middle[a]) / length);
-            for component in (0..D).filter(|c| conditions.fixed[local * D + c]) {
-                let row = motions_at(&x, component);
-                for (i, a) in row.iter().enumerate() {
-                    for (j, b) in row.iter().enumerate() {
-                        gram[i * motions + j] += a * b;
-                    }
+    let mut grams: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for (local, &piece) in pieces.iter().enumerate().take(numbering.owned) {
+        let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
+        let x = grid.node_position(numbering.nodes[local]);
+        let x: [f64; D] = std::array::from_fn(|a| (x[a] - middle[a]) / length);
+        for component in (0..D).filter(|c| conditions.fixed[local * D + c]) {
+            let row = motions_at(&x, component);
+            for (i, a) in row.iter().enumerate() {
+                for (j, b) in row.iter().enumerate() {
+                    gram[i * motions + j] += a * b;
                 }
             }
         }
-        let gram = DMatrix::from_vec(motions, motions, world.sum_slice(&gram));
-        let spectrum = gram.symmetric_eigen();
+    }
+    let free = of_all_ranks(world, model, grams)?.into_iter().find_map(|(piece, gram)| {
+        let spectrum = DMatrix::from_vec(motions, motions, gram).symmetric_eigen();
         let largest = spectrum.eigenvalues.max();
-        let free = (0..motions).find(|&k| spectrum.eigenvalues[k] <= FREE * largest.max(1e-300));
-        if let Some(free) = free {
-            let motion = name(spectrum.eigenvectors.column(free).iter().copied(), D);
-            return Err(Error::Input(format!(
-                "body \"{}\" can {motion} freely: no boundary holds the nodes around it against \
-                 this, so that the quasi-static system is singular; check the places and \
-                 components of [[boundary]]",
-                deck.bodies[lead].name
-            )));
-        }
-    }
-    Ok(())
+        let free = (0..motions).find(|&k| spectrum.eigenvalues[k] <= FREE * largest.max(1e-300))?;
+        Some((piece, name(spectrum.eigenvectors.column(free).iter().copied(), D)))
+    });
+    let first = world.min_u64(free.as_ref().map_or(u64::MAX, |(piece, _)| *piece));
+    let motion = free.filter(|(piece, _)| *piece == first).map(|(_, motion)| motion);
+    let Some(motion) = world.first_message(motion) else { return Ok(()) };
+    let what = name_piece(world, model, points, &numbering, &pieces, first)?;
+    Err(Error::Input(format!(
+        "{what} can {motion} freely: no boundary holds the nodes around it against this, so that \
+         the quasi-static system is singular; check the places and components of [[boundary]]"
+    )))
 }
 
-/// Bodies at each owned node.
-fn touched_nodes<const D: usize>(
+/// Ghost faces that hold cells together which share no node: only among simplices.
+fn ties<const D: usize>(
     world: &World,
-    grid: &Grid<D>,
+    model: &Model<D>,
     populated: &Populated,
-    numbering: &Numbering,
-    bodies: usize,
-) -> Result<Vec<Vec<bool>>> {
-    let mut flags = vec![0.0; numbering.len() * bodies];
-    let mut nodes = Vec::new();
-    for &(cell, inside) in &populated.owned {
-        nodes.clear();
-        grid.cell_nodes(cell, &mut nodes);
-        for local in nodes.iter().filter_map(|&node| numbering.local(node)) {
-            for body in (0..bodies).filter(|body| inside >> body & 1 == 1) {
-                flags[local * bodies + body] = 1.0;
-            }
-        }
+) -> Result<Vec<FaceStencil>> {
+    if !model.grid.element().is_simplex() {
+        return Ok(Vec::new());
     }
-    numbering.halo.reverse_add(world, &mut flags, bodies)?;
-    let owned = flags.chunks_exact(bodies).take(numbering.owned);
-    Ok(owned.map(|flags| flags.iter().map(|&flag| flag > 0.0).collect()).collect())
+    discretise::find_faces(world, model, populated).map(|(faces, _)| faces)
 }
 
-/// The first body of the group that each body belongs to.
-fn sharing(world: &World, touched: &[Vec<bool>], bodies: usize) -> Vec<usize> {
-    let mut shared = vec![0.0; bodies * bodies];
-    for at in touched {
-        for a in (0..bodies).filter(|&a| at[a]) {
-            for b in (0..bodies).filter(|&b| at[b]) {
-                shared[a * bodies + b] = 1.0;
+/// The sums over all ranks of the pieces whose first node is owned here, ascending.
+fn of_all_ranks<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    grams: BTreeMap<u64, Vec<f64>>,
+) -> Result<BTreeMap<u64, Vec<f64>>> {
+    let mut outgoing: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
+    let motions = D + D * (D - 1) / 2;
+    for (piece, gram) in grams {
+        let owner = model.partition.owner_of_node(&model.grid, piece as usize);
+        let list = outgoing.entry(owner).or_default();
+        list.push(piece);
+        list.extend(gram.iter().map(|value| value.to_bits()));
+    }
+    let mut sums: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for (_, words) in exchange(world, outgoing.into_iter().collect())? {
+        for record in words.chunks_exact(1 + motions * motions) {
+            let sum = sums.entry(record[0]).or_insert_with(|| vec![0.0; record.len() - 1]);
+            for (sum, &word) in sum.iter_mut().zip(&record[1..]) {
+                *sum += f64::from_bits(word);
             }
         }
     }
-    let shared = world.sum_slice(&shared);
-    let mut group: Vec<usize> = (0..bodies).collect();
-    // As many rounds as the longest chain of neighbours can need.
-    for _ in 0..bodies {
-        for a in 0..bodies {
-            for b in 0..bodies {
-                if shared[a * bodies + b] > 0.0 {
-                    let first = group[a].min(group[b]);
-                    (group[a], group[b]) = (first, first);
-                }
-            }
+    Ok(sums)
+}
+
+/// The body of a piece, and its first point if it is not the whole body. Collective.
+fn name_piece<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    numbering: &Numbering,
+    pieces: &[u64],
+    piece: u64,
+) -> Result<String> {
+    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
+    let mut within = |p: usize| -> Result<bool> {
+        cells.clear();
+        nodes.clear();
+        let basis = model.deck.method.basis;
+        basis::populated_cells(&model.grid, basis, points, p, None, &mut cells)?;
+        cells.iter().take(1).for_each(|&cell| model.grid.cell_nodes(cell, &mut nodes));
+        Ok(nodes.iter().any(|&n| numbering.local(n).is_some_and(|local| pieces[local] == piece)))
+    };
+    let inside: Result<Vec<bool>> = (0..points.len()).map(&mut within).collect();
+    let inside = world.fail_together(inside)?;
+    let own = (0..points.len()).filter(|&p| inside[p]).min_by_key(|&p| points.id[p]);
+    let first = world.min_u64(own.map_or(u64::MAX, |p| points.id[p]));
+    let own = own.filter(|&p| points.id[p] == first);
+    let body = world.min_u64(own.map_or(u64::MAX, |p| u64::from(points.body[p]))) as usize;
+    let rest = (0..points.len()).any(|p| points.body[p] as usize == body && !inside[p]);
+    let whole = !world.any(rest);
+    let name = own.map(|p| {
+        let name = &model.deck.bodies[body].name;
+        if whole {
+            return format!("body \"{name}\"");
         }
-    }
-    group
+        format!(
+            "a piece of body \"{name}\" that shares no grid node with the rest, the one with point \
+             {first} at {:?} m,",
+            points.position[p]
+        )
+    });
+    Ok(world.first_message(name).unwrap_or_default())
 }
 
 /// Middle and largest extent of all points.

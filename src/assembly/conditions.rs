@@ -4,6 +4,7 @@ use crate::basis;
 use crate::deck::Scope;
 use crate::deck::expression::Expression;
 use crate::deck::model::{Basis, Boundary, Place, Rotation};
+use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::parallel::World;
@@ -72,19 +73,21 @@ impl Conditions {
                     let dof = local * D + component;
                     if !value.is_finite() {
                         problem = problem.or(Some(format!(
-                            "boundary \"{}\" moves component {component} of the node at {:?} by \
+                            "boundary \"{}\" moves {} of the node at {:?} by \
                              {value}: its expression is not finite there",
                             boundary.name,
+                            AXES[component],
                             grid.node_position(node),
                         )));
                     }
                     let clash = conditions.fixed[dof] && conditions.increment[dof] != value;
                     if clash && conditions.increment[dof] != 0.0 && value != 0.0 {
                         problem = problem.or(Some(format!(
-                            "boundary \"{}\" moves component {component} of the node at {:?} by \
+                            "boundary \"{}\" moves {} of the node at {:?} by \
                              {value} in this step, but an earlier boundary moves it by {}; let \
                              one of them leave the node out",
                             boundary.name,
+                            AXES[component],
                             grid.node_position(node),
                             conditions.increment[dof]
                         )));

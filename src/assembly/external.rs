@@ -59,7 +59,7 @@ pub fn point_forces<const D: usize>(
     }
     match forces.iter().position(|force| force.iter().any(|f| !f.is_finite())) {
         None => Ok(forces),
-        Some(p) => Err(Error::Run(format!(
+        Some(p) => Err(Error::Input(format!(
             "the load on point {} at {:?} is not finite ({:?} N at s = {load_factor}): check the \
              expressions of [[load]]",
             points.id[p], points.position[p], forces[p]
