@@ -442,3 +442,88 @@ fn checks_of_conditions_and_results() {
         )],
     );
 }
+
+/// Only dynamics has a time: elsewhere `t` would stay 0 and `seconds` would mean the load factor.
+#[test]
+fn time_where_there_is_none() {
+    assert_eq!(
+        replaced("every = 5", "every = { seconds = 0.3 }"),
+        "\
+beam.toml:56:9: output.every: type = \"quasi-static\" has no time
+    |
+ 56 | every = { seconds = 0.3 }
+    |         ^^^^^^^^^^^^^^^^^
+   = give a whole number of steps"
+    );
+    let why = "type = \"quasi-static\" has no time t\n   = use the load factor s";
+    expect(
+        BEAM,
+        &[
+            (&["boundary.1.fix=", "boundary.1.displacement={ y = \"0.1*t\" }"], why),
+            (&["load.0.point=", "load.0.body_force=[\"0\", \"sin(t)\"]"], why),
+            (&["verify.0.exact=X*t"], why),
+            (
+                &[
+                    "analysis.type=conditioning",
+                    "boundary.0.fix=",
+                    "boundary.0.displacement.x=\"t\"",
+                ],
+                "type = \"conditioning\" has no time t",
+            ),
+        ],
+    );
+    for set in ["boundary.1.displacement={ y = \"0.1*s\" }", "verify.0.exact=X*s"] {
+        let sets = ["boundary.1.fix=".to_string(), set.to_string()];
+        let keep = usize::from(set.starts_with("verify"));
+        deck::read(Path::new("beam.toml"), BEAM, &sets[keep..]).unwrap_or_else(|e| panic!("{e}"));
+    }
+    let moved = "boundary=[{ where = { side = \"left\" }, displacement = { x = \"t\" } }]";
+    let t = [moved.to_string()];
+    deck::read(Path::new("collision.toml"), COLLISION, &t[..]).unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// By their power of ten, not by three hundred digits.
+#[test]
+fn numbers_that_are_huge_or_tiny() {
+    expect(
+        BEAM,
+        &[
+            (
+                &["grid.size=[1e300, 1e300]"],
+                "1e300 m along x with h = 0.5 m is 2e300 cells, more than can be numbered",
+            ),
+            (&["grid.h=1e-300"], "11 m along x with h = 1e-300 m is 1.1"),
+            (&["grid.h=1e300"], "with h = 1e300 m, which is 1.1e-299 cells; nearest: 1e300 m"),
+            (
+                &["body.0.shape.translate=[1e300, 0]"],
+                "outside the grid: x from 1e300 to 1e300 m, the grid from 0 to 11 m",
+            ),
+        ],
+    );
+    assert!(message(BEAM, &["grid.h=1e-300"]).len() < 300);
+}
+
+/// What a later stage says of a key: at its line, at the table's where it is not written, and at
+/// the option that set it.
+#[test]
+fn keys_remember_their_places() {
+    let sets = ["load.0.point.force=[0, 1]".to_string()];
+    let deck = deck::read(Path::new("beam.toml"), BEAM, &sets).unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(
+        deck.places.say("grid.h", "too fine"),
+        "\
+beam.toml:23:5: grid.h: too fine
+    |
+ 23 | h = 0.5
+    |     ^^^"
+    );
+    assert!(
+        deck.places.say("boundary.1.fix", "so").starts_with("beam.toml:43:7: boundary.1.fix: so")
+    );
+    assert!(deck.places.say("boundary.1.rotation", "no").starts_with("beam.toml:41:"));
+    assert_eq!(
+        deck.places.say("load.0.point.force", "weak"),
+        "--set load.0.point.force=[0, 1]: load.0.point.force: weak"
+    );
+    assert_eq!(deck.places.say("conditioning", "none"), "beam.toml: conditioning: none");
+}

@@ -172,6 +172,315 @@ with basis = \"gimp\" a domain may not be larger than a cell, found 0.6 m
     );
 }
 
+/// As [`refused`], with a file of points beside the deck.
+#[track_caller]
+fn points_refused(content: &str, message: &str) {
+    for ranks in [1, 2] {
+        let outcome = with_points().ranks(ranks).attempt_in(beside(content));
+        assert_eq!(said(&outcome), message, "on {ranks} ranks");
+        assert_eq!(outcome.code, 2, "on {ranks} ranks: {message}");
+        assert_eq!(outcome.files(), ["deck.toml", "points.csv"], "half-written");
+    }
+}
+
+/// The block made of the points of a file.
+fn with_points() -> Run {
+    block().replaced(|deck| {
+        let deck = deck.replace("shape = { box = { min = [0, 0], max = [4, 3] } }", POINTS);
+        deck.replace("points_per_cell = [2, 2]\n", "")
+    })
+}
+
+const POINTS: &str = "shape = { points = \"points.csv\" }";
+
+fn beside(content: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(folder.path().join("points.csv"), content).unwrap();
+    folder
+}
+
+/// A file of points with these columns, on a grid of `n` by `n` squares of a quarter.
+fn squares(n: usize, header: &str, rest: &str) -> String {
+    let rows = (0..n * n).map(|k| {
+        let at = |i: usize| 0.125 + 0.25 * i as f64;
+        format!("{},{},0.0625{rest}\n", at(k % n), at(k / n))
+    });
+    format!("{header}\n{}", rows.collect::<String>())
+}
+
+#[test]
+fn points_files_that_are_wrong() {
+    let expected = "the header must read x,y,volume and may add vx,vy (points of body \"block\")";
+    points_refused(
+        "x,y,volume\n1,1,0.25\n# a comment\n2,1,0.36\n",
+        "error: points.csv:4: volume 0.36 is that of a domain of width 0.6 m, expected at most the \
+cell size 0.5 m: with basis = \"gimp\" a domain may not be larger than a cell (points of body \
+\"block\")",
+    );
+    points_refused(
+        "x,y,z,volume\n1,1,0,0.25\n",
+        &format!("error: points.csv:1: unknown column \"z\" (the problem is 2D); {expected}"),
+    );
+    points_refused(
+        "x,y,volume,velocity_x\n1,1,0.25,3\n",
+        &format!(
+            "error: points.csv:1: unknown column \"velocity_x\", did you mean \"vx\"?; {expected}"
+        ),
+    );
+    points_refused(
+        "x,y,volumes\n1,1,0.25\n",
+        &format!(
+            "error: points.csv:1: unknown column \"volumes\", did you mean \"volume\"?; {expected}"
+        ),
+    );
+    points_refused(
+        "x,y,x,volume\n1,1,1,0.25\n",
+        &format!("error: points.csv:1: column \"x\" is there twice; {expected}"),
+    );
+    points_refused("x,y\n1,1\n", &format!("error: points.csv:1: no column \"volume\"; {expected}"));
+    points_refused(
+        "x,y,volume\n",
+        "error: points.csv:1: a header and no points (points of body \"block\")",
+    );
+    refused(
+        &with_points(),
+        2,
+        "error: deck.toml:29:20: body.0.shape.points: cannot read points.csv: No such file or \
+directory (os error 2)
+    |
+ 29 | shape = { points = \"points.csv\" }
+    |                    ^^^^^^^^^^^^",
+    );
+    // Six digits of a third are not a wrong deck.
+    let third = with_points().set("grid.h=0.333333333333333333").word("--check");
+    let outcome = third.attempt_in(beside("x,y,volume\n0.2,0.1,0.111111\n0.5,0.1,0.111112\n"));
+    assert!(!said(&outcome).contains("domain"), "{}", outcome.stderr);
+}
+
+/// The velocities of a file of points are theirs, unless the deck gives the body one.
+#[test]
+fn points_keep_the_velocities_of_their_file() {
+    let content = squares(8, "x,y,volume,vx,vy", ",0.5,0.25");
+    let run = with_points()
+        .set("analysis={ type = \"explicit\", steps = 1, duration = 1e-6 }")
+        .set("ghost.stiffness_factor=")
+        .set("ghost.mass_factor=0.25")
+        .set("boundary=[]")
+        .set("load=[]")
+        .set("output.fields=[\"velocity\"]")
+        .ranks(2);
+    for (run, expected) in
+        [(run.clone(), [0.5, 0.25]), (run.set("body.0.velocity=[\"1\", \"0.125\"]"), [1.0, 0.125])]
+    {
+        let outcome = run.attempt_in(beside(&content));
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        let points = outcome.results().points(0);
+        for (component, expected) in expected.into_iter().enumerate() {
+            assert!(points.component("velocity", component).iter().all(|v| *v == expected));
+        }
+    }
+}
+
+#[test]
+fn formulas_without_a_value_at_the_start() {
+    refused(
+        &replaced("gravity = [0, -20]", "body_force = [\"1/0\", \"0\"]"),
+        2,
+        "error: deck.toml:43:14: load.0.body_force: x is inf N/m3 at point 0 at [0.125, 0.125] m, s \
+= 0: the expression is not finite there
+    |
+ 43 | body_force = [\"1/0\", \"0\"]
+    |              ^^^^^^^^^^^^",
+    );
+    // First seen at the end of the first step, on the rank that holds the other end of the block.
+    refused(
+        &replaced("gravity = [0, -20]", "body_force = [0, \"if(s > 0 && x > 3.8, sqrt(-1), 0)\"]"),
+        2,
+        "error: deck.toml:43:14: load.0.body_force: y is NaN N/m3 at point 31 at [3.875, 0.125] m, s \
+= 0.5: the expression is not finite there
+    |
+ 43 | body_force = [0, \"if(s > 0 && x > 3.8, sqrt(-1), 0)\"]
+    |              ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^",
+    );
+    let explicit = block().set("analysis={ type = \"explicit\", steps = 10, duration = 1e-3 }");
+    refused(
+        &explicit.set("body.0.velocity=[0, \"ln(0.5 - X)\"]"),
+        2,
+        "error: --set body.0.velocity=[0, \"ln(0.5 - X)\"]: body.0.velocity: y is NaN m/s at point 8 \
+at [0.625, 0.125] m: the expression is not finite there",
+    );
+    refused(
+        &replaced("fix = [\"x\"]", "displacement = { x = \"if(Y > 2.9, 1/0, 0)\" }"),
+        2,
+        "error: deck.toml:40:16: boundary.1.displacement: boundary \"symmetry\" moves x of the node \
+at [0.0, 3.0] by inf: its expression is not finite there
+    |
+ 40 | displacement = { x = \"if(Y > 2.9, 1/0, 0)\" }
+    |                ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^",
+    );
+}
+
+/// Pieces are found across ranks, and only those that nothing holds are refused.
+#[test]
+fn pieces_that_nothing_holds() {
+    let boxes = |list: &str| format!("body.0.shape={{ union = [{list}] }}");
+    let beside = "{ box = { min = [0, 0], max = [2, 1] } }";
+    let away = boxes(&format!("{beside}, {{ box = {{ min = [4, 2], max = [5, 3] }} }}"));
+    refused(
+        &block().set(&away),
+        2,
+        "error: a piece of body \"block\" that shares no grid node with the rest, the one with \
+point 208 at [4.125, 2.125] m, can move along x freely: no boundary holds the nodes around it \
+against this, so that the quasi-static system is singular; check the places and components of \
+[[boundary]]",
+    );
+    // On the ground the second piece can still slide; the first is held.
+    let slides = boxes(&format!("{beside}, {{ box = {{ min = [4, 0], max = [5, 1] }} }}"));
+    let outcome = block().set(&slides).ranks(2).attempt();
+    assert_eq!(outcome.code, 2, "{}", outcome.stderr);
+    assert!(said(&outcome).contains("point 32 at [4.125, 0.125] m, can move along x freely"));
+    // Rough ground holds both; so does a touch at one node, as far as can be seen.
+    let rough = block().set(&slides).set("boundary.0.fix=[\"x\", \"y\"]").word("--check");
+    let touching = boxes(&format!("{beside}, {{ box = {{ min = [2, 1], max = [3, 2] }} }}"));
+    let touching = block().set(&touching).word("--check");
+    for run in [rough, touching] {
+        for ranks in [1, 2] {
+            let outcome = run.clone().ranks(ranks).attempt();
+            assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        }
+    }
+    // Two bodies, one upon the other: only the lower one stands on the ground.
+    let second = |min: f64| {
+        let top = min + 1.0;
+        format!(
+            "\n[[body]]\nname = \"upper\"\nmaterial = \"soil\"\ndensity = 1000.0\nshape = {{ box = {{ \
+             min = [0, {min}], max = [2, {top}] }} }}\n"
+        )
+    };
+    let stack =
+        |min| Run::text(&(BLOCK.replace("max = [4, 3]", "max = [4, 1]") + &second(min))).ranks(2);
+    assert_eq!(stack(1.0).word("--check").attempt().code, 0);
+    let apart = stack(2.0).attempt();
+    assert_eq!(apart.code, 2);
+    assert!(said(&apart).starts_with("error: body \"upper\" can move along y freely: "));
+}
+
+/// A strip that goes up and down through slabs of the grid: each rank sees several pieces of what
+/// is one, along the slabs and across them. With a link left out it is two.
+#[test]
+fn pieces_that_other_ranks_join() {
+    let strip = |links: &[usize], upright: bool| {
+        let part = |x: [f64; 2], y: [f64; 2]| {
+            let (x, y) = if upright { (y, x) } else { (x, y) };
+            format!("{{ box = {{ min = [{}, {}], max = [{}, {}] }} }}", x[0], y[0], x[1], y[1])
+        };
+        let posts = (0..5).map(|k| 2.0 * k as f64).map(|x| part([x, x + 0.5], [0.0, 4.0]));
+        let links = links.iter().map(|&k| {
+            let x = 2.0 * k as f64;
+            part([x, x + 2.5], if k % 2 == 0 { [0.0, 0.5] } else { [3.5, 4.0] })
+        });
+        let parts: Vec<String> = posts.chain(links).collect();
+        let (size, side) = if upright { ("[4, 9]", "bottom") } else { ("[9, 4]", "left") };
+        block()
+            .set(format!("grid.size={size}"))
+            .set("parallel={ brick = 1, initial = \"slabs\" }")
+            .set(format!("body.0.shape={{ union = [{}] }}", parts.join(", ")))
+            .set(format!("boundary=[{{ where = {{ side = \"{side}\" }}, fix = [\"x\", \"y\"] }}]"))
+            .word("--check")
+    };
+    for (upright, far) in [(false, "[6.125, 0.125]"), (true, "[0.125, 6.125]")] {
+        for ranks in [1, 2, 3] {
+            let whole = strip(&[0, 1, 2, 3], upright).ranks(ranks).attempt();
+            assert_eq!(whole.code, 0, "{ranks} ranks: {}", whole.stderr);
+            let parted = strip(&[0, 1, 3], upright).ranks(ranks).attempt();
+            assert_eq!(parted.code, 2, "{ranks} ranks: {}", parted.stdout);
+            let text = said(&parted);
+            assert!(text.starts_with("error: a piece of body \"block\" that shares no"), "{text}");
+            assert!(text.contains(&format!(" at {far} m, can move along x freely")), "{text}");
+        }
+    }
+}
+
+#[test]
+fn conditions_on_nothing() {
+    refused(
+        &replaced("side = \"left\"", "box = { min = [5.1, 3.1], max = [5.2, 3.2] }"),
+        2,
+        "error: deck.toml:39:17: boundary.1.where.box: holds no node of the grid: none has x from \
+5.1 to 5.2 m; nearest: 5 and 5.5 m
+    |
+ 39 | where = { box = { min = [5.1, 3.1], max = [5.2, 3.2] } }
+    |                 ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^",
+    );
+    refused(
+        &replaced("gravity = [0, -20]", "point = { nearest = [[4, 3], [50, 3]], force = [0, -1] }"),
+        2,
+        "error: deck.toml:43:21: load.0.point.nearest: [50.0, 3.0] m is 46.13 m away from the nearest \
+point of body \"block\", which is at [3.875, 2.875] m; expected a place within a cell of it (0.8839 m)
+    |
+ 43 | point = { nearest = [[4, 3], [50, 3]], force = [0, -1] }
+    |                     ^^^^^^^^^^^^^^^^^^",
+    );
+    // A wall ahead of the body may be meant.
+    let wall = "\n[[boundary]]\nname = \"wall\"\nwhere = { side = \"right\" }\nfix = [\"x\"]\n";
+    for ranks in [1, 2] {
+        let outcome = Run::text(&format!("{BLOCK}{wall}")).ranks(ranks).attempt();
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        let warnings = |text: &str| text.matches("warning: ").count();
+        let log = outcome.results().text("log.txt");
+        assert_eq!(warnings(&log), 1, "{log}");
+        assert!(log.contains("warning: boundary \"wall\" acts on nothing at the start"), "{log}");
+    }
+}
+
+/// The run is as good without the figure.
+#[test]
+fn figures_of_merit_without_a_value() {
+    for norm in ["max", "volume-l1", "volume-l2"] {
+        for ranks in [1, 2] {
+            let results = block()
+                .set(format!(
+                    "verify=[{{ name = \"e\", field = \"stress.yy\", norm = \"{norm}\", exact = \
+                     \"if(X < 1, sqrt(-1), 0)\" }}, {{ name = \"d\", field = \"J\", norm = \"max\", \
+                     exact = \"1\" }}]"
+                ))
+                .ranks(ranks)
+                .results();
+            assert!(results.summary["verify"]["e"].is_null(), "{norm} on {ranks} ranks");
+            assert!(results.verify("d") > 0.0);
+            let log = results.text("log.txt");
+            assert!(log.contains("warning: verify \"e\" has no value (at point 0, [0.1"), "{log}");
+            assert!(log.contains("against [NaN]): summary.json says null"), "{log}");
+            assert_eq!(log.matches("warning").count(), 1, "{log}");
+        }
+    }
+}
+
+#[test]
+fn problems_larger_than_the_machine() {
+    let run = block()
+        .set("grid.size=[60000, 40000]")
+        .set("body.0.shape={ box = { min = [0, 0], max = [40000, 30000] } }");
+    let mesh = "grid={ type = \"mesh\", generate = { box = { min = [0, 0], max = [1, 1], cells = \
+                [3000000, 3000000] } } }";
+    let mesh = block().set(mesh).set("method.basis=mpm").set("body.0.shape={ cells = \"all\" }");
+    let mesh = mesh.set("boundary=[{ where = { tag = \"left\" }, fix = [\"x\", \"y\"] }]");
+    for (run, size) in [
+        (run.clone(), "about 1.9e10 points and 4.8e9 active nodes need 21.0 TB on this machine, "),
+        (run.word("--check"), "about 1.9e10 points and 4.8e9 active nodes need 21.0 TB"),
+        (mesh, "about 3.6e13 points and 9.0e12 active nodes in a mesh of 9.0e12 cells need "),
+    ] {
+        for ranks in [1, 2] {
+            let outcome = run.clone().ranks(ranks).attempt();
+            let text = said(&outcome);
+            assert_eq!(outcome.code, 2, "{text}");
+            let start = format!("error: the problem is too large: {size}");
+            assert!(text.starts_with(&start), "{text}");
+            assert_eq!(outcome.files(), ["deck.toml"]);
+        }
+    }
+}
+
 #[test]
 fn systems_that_nothing_holds() {
     let begin = BLOCK.find("[[boundary]]").unwrap();
@@ -296,7 +605,33 @@ fn one_rank_that_fails_ends_all() {
         assert!(text.starts_with("error: step 2: the load on point "), "{text}");
         assert!(text.contains("is not finite ([0.0, NaN] N at s = 1)"), "{text}");
         assert!(text.ends_with("results: out, good up to step 1"), "{text}");
+        // No numerics heals a formula.
+        assert!(!text.contains("try"), "{text}");
         assert_eq!(outcome.results().summary["status"], "failed");
+    }
+}
+
+/// A formula that loses its value on the way, in dynamics: no advice, and the last state is there.
+#[test]
+fn formulas_that_lose_their_value_later() {
+    for (kind, step) in [
+        ("explicit", "step 12 (to t = 1.200000e-2 s): "),
+        ("implicit-dynamic", "step 11 of 20 (t = 1.100000e-2 s): "),
+    ] {
+        let run = replaced("quasi-static", kind)
+            .set("ghost={ mass_factor = 0.25 }")
+            .set("analysis.steps=20")
+            .set("analysis.duration=0.02")
+            .set("load=[{ body_force = [\"0\", \"if(t > 0.0105, sqrt(-1), -2e4)\"] }]");
+        for ranks in [1, 2] {
+            let outcome = run.clone().ranks(ranks).attempt();
+            let text = said(&outcome);
+            assert_eq!(outcome.code, 1, "{text}");
+            assert!(text.starts_with(&format!("error: {step}the load on point ")), "{text}");
+            assert!(text.contains("check the expressions of [[load]]"), "{text}");
+            assert!(!text.contains("try"), "{text}");
+            assert_eq!(outcome.results().summary["status"], "failed");
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 
 use crate::assembly::manufactured::Manufactured;
 use crate::deck::model::{self, Initial, Load};
-use crate::deck::{Deck, figure};
+use crate::deck::{Deck, rough};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
@@ -186,10 +186,10 @@ fn place_point_forces<const D: usize>(
                     format!(
                         "{place:?} m is {} m away from the nearest point of body \"{}\", which is \
                          at {:?} m; expected a place within a cell of it ({} m)",
-                        figure(best),
+                        rough(best),
                         deck.bodies[*body].name,
                         points.position_initial[p],
-                        figure(reach)
+                        rough(reach)
                     )
                 })
             });

@@ -34,7 +34,7 @@ use std::path::{Path, PathBuf};
 pub use expression::{Expression, Scope};
 pub use model::Deck;
 pub use places::Places;
-pub use problems::{figure, nearest};
+pub use problems::{figure, nearest, rough};
 pub use resolved::resolved;
 pub use shape::Shape;
 

@@ -149,6 +149,11 @@ pub fn figure(value: f64) -> String {
     }
 }
 
+/// [`figure`] to four digits.
+pub fn rough(value: f64) -> String {
+    figure(format!("{value:.3e}").parse().unwrap_or(value))
+}
+
 /// The known name nearest to a mistyped one, if one is near enough to be meant.
 pub fn nearest<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
     known

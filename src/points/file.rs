@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::deck::model::{Basis, Body, Deck};
-use crate::deck::{figure, nearest};
+use crate::deck::{figure, nearest, rough};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 
@@ -61,11 +61,11 @@ pub fn read_points<const D: usize>(
             Some(position) => wrong(position.line(), error.to_string()),
             None => unreadable(error),
         })?;
-        let line = record.position().map_or(0, csv::Position::line);
+        let line = || line_of(path, &record);
         let number = |at: usize| -> Result<f64> {
             let text = record.get(at).unwrap_or("");
             text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
-                wrong(line, format!("\"{text}\" in column \"{}\" is not a number", &headers[at]))
+                wrong(line(), format!("\"{text}\" in column \"{}\" is not a number", &headers[at]))
             })
         };
         let mut x = [0.0; D];
@@ -74,7 +74,7 @@ pub fn read_points<const D: usize>(
         }
         let volume = number(columns.volume)?;
         if volume <= 0.0 {
-            return Err(wrong(line, format!("volume {volume} must be positive")));
+            return Err(wrong(line(), format!("volume {volume} must be positive")));
         }
         let width = volume.powf(1.0 / D as f64);
         if width > widest * (1.0 + SLACK) {
@@ -82,10 +82,10 @@ pub fn read_points<const D: usize>(
                 "volume {} is that of a domain of width {} m, expected at most the cell size {} \
                  m: with basis = \"gimp\" a domain may not be larger than a cell",
                 figure(volume),
-                figure(width),
+                rough(width),
                 figure(widest)
             );
-            return Err(wrong(line, what));
+            return Err(wrong(line(), what));
         }
         let mut velocity = [0.0; D];
         for (value, at) in velocity.iter_mut().zip(&columns.speeds) {
@@ -106,6 +106,19 @@ pub fn read_points<const D: usize>(
         *points.velocity.last_mut().expect("a point was just pushed") = velocity;
     }
     Ok(rows.len() as u64)
+}
+
+/// Line of a record: the reader counts those of comments and blanks before it as its own.
+fn line_of(path: &Path, record: &csv::StringRecord) -> u64 {
+    let Some(position) = record.position() else { return 0 };
+    let bytes = std::fs::read(path).unwrap_or_default();
+    let (before, after) = bytes.split_at(bytes.len().min(position.byte() as usize));
+    let ends = before.iter().filter(|&&byte| byte == b'\n').count();
+    let skipped = after.split(|&byte| byte == b'\n').take_while(|line| {
+        let line = line.trim_ascii();
+        line.is_empty() || line.starts_with(b"#")
+    });
+    (1 + ends + skipped.count()) as u64
 }
 
 fn at(path: &Path, body: &Body, line: u64, what: &str) -> Error {
@@ -131,7 +144,11 @@ impl Columns {
         let known = || axes.iter().chain(&["volume"]).chain(rates).copied();
         for (at, name) in headers.iter().enumerate() {
             if !known().any(|column| column == name) {
-                let hint = match (D, name, nearest(name, known())) {
+                // velocity_x, v1_y
+                let speed = || {
+                    rates.iter().copied().find(|v| name.starts_with('v') && name.ends_with(&v[1..]))
+                };
+                let hint = match (D, name, nearest(name, known()).or_else(speed)) {
                     (2, "z" | "vz", _) => " (the problem is 2D)".to_string(),
                     (_, _, Some(near)) => format!(", did you mean \"{near}\"?"),
                     _ => String::new(),

@@ -46,7 +46,8 @@ pub const SECTIONS: &[Section] = &[
             key("gauss", Count, Optional("none"),
                 "Gauss points per axis and cell: updated-Lagrangian finite elements, with basis = \"mpm\" and motion = { follow = \"material\" }.")
                 .range(between(1.0, 8.0)),
-            key("velocity", Expressions("X Y Z"), Optional("zeros"), "Initial velocity.")
+            key("velocity", Expressions("X Y Z"), Optional("zeros, or those of the file of points"),
+                "Initial velocity.")
                 .unit("m/s"),
         ],
     },
@@ -79,7 +80,7 @@ pub const SECTIONS: &[Section] = &[
             key("intersection", Special(SHAPES), Optional("-"), "Points in all of them."),
             key("difference", Special(SHAPES), Optional("-"), "The first minus the others."),
             key("points", Text, Optional("-"),
-                "csv file with the header x,y[,z],volume[,vx,vy,vz], beside the deck."),
+                "csv file with the header x,y[,z],volume[,vx,vy,vz] and no other columns, beside the deck. A point's domain is a square (cube) of its volume; with basis = \"gimp\" no wider than a cell."),
             key("cells", Text, Optional("-"),
                 "Cells of a mesh with this tag, or \"all\"."),
             key("rotate", Table("shape.rotate"), Optional("not turned"),
@@ -146,7 +147,7 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             key("side", Choice(SIDES), Optional("-"), "A face of the lattice."),
             key("box", Table("where.box"), Optional("-"),
-                "Nodes in or on a box (tolerance 1e-9 of a cell), in start positions."),
+                "Nodes in or on a box (tolerance 1e-9 of a cell), in start positions; at least one of the grid."),
             key("tag", Text, Optional("-"), "Nodes of a tag of the mesh."),
             key("cells_of", Text, Optional("-"),
                 "Nodes of the cells that hold the outermost points of a body, found anew in each step (Lagrangian §7.2)."),
@@ -164,7 +165,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "displacement",
         header: "boundary.displacement",
-        doc: "Total over the analysis; a value without `s` or `t` is ramped with the load factor.",
+        doc: "Total over the analysis; a value without `s` or `t` is ramped with the load factor. `t` only in dynamics.",
         keys: &[
             key("x", Expression("X Y Z s t"), Optional("free"), "Component x.").unit("m"),
             key("y", Expression("X Y Z s t"), Optional("free"), "Component y.").unit("m"),
@@ -188,7 +189,7 @@ pub const SECTIONS: &[Section] = &[
             key("point", Table("load.point"), Optional("-"), "Force held by material points."),
             key("gravity", Vector, Optional("-"), "Acceleration.").unit("m/s2"),
             key("body_force", Expressions("X Y Z x y z s t"), Optional("-"),
-                "Force per initial volume; without s or t ramped in quasi-static analyses.")
+                "Force per initial volume; without s ramped in quasi-static analyses, which have no t.")
                 .unit("N/m3"),
             key("manufactured", Expressions("X Y Z s"), Optional("-"),
                 "The body force that makes this displacement field exact.").unit("m"),
@@ -200,7 +201,7 @@ pub const SECTIONS: &[Section] = &[
         doc: "Shared equally by the points nearest to the given places.",
         keys: &[
             key("body", Text, Optional("the only body"), "Name of the body."),
-            key("nearest", Points, Required, "Places, one point each.").unit("m"),
+            key("nearest", Points, Required, "Places, one point each: the nearest, at most the diagonal of a cell (and half that of its domain) away.").unit("m"),
             key("force", Vector, Required, "Total force (per metre in plane strain).").unit("N"),
         ],
     },

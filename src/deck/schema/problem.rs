@@ -196,7 +196,7 @@ pub const RESULT_SECTIONS: &[Section] = &[
     Section {
         name: "verify",
         header: "[[verify]]",
-        doc: "A figure of merit, printed and stored in summary.json.",
+        doc: "A figure of merit, printed and stored in summary.json. One without a finite value (a formula that has none at some point) does not fail the run, whose results are as good without it: a warning names the first such point, and summary.json says null.",
         keys: &[
             key("name", Text, Required, "Its name there."),
             key(
@@ -244,9 +244,14 @@ pub const RESULT_SECTIONS: &[Section] = &[
         name: "output.every",
         header: "output.every",
         doc: "An interval of time instead of steps.",
-        keys: &[key("seconds", Number, Required, "Simulated time between outputs.")
-            .unit("s")
-            .range(POSITIVE)],
+        keys: &[key(
+            "seconds",
+            Number,
+            Required,
+            "Simulated time between outputs; only in dynamics.",
+        )
+        .unit("s")
+        .range(POSITIVE)],
     },
     Section {
         name: "output.checkpoint",
