@@ -296,7 +296,7 @@ fn formulas_without_a_value_at_the_start() {
     refused(
         &replaced("gravity = [0, -20]", "body_force = [0, \"if(s > 0 && x > 3.8, sqrt(-1), 0)\"]"),
         2,
-        "error: deck.toml:43:14: load.0.body_force: y is NaN N/m3 at point 31 at [3.875, 0.125] m, s \
+        "error: deck.toml:43:14: load.0.body_force: y is NaN N/m3 at point 29 at [3.875, 0.125] m, s \
 = 0.5: the expression is not finite there
     |
  43 | body_force = [0, \"if(s > 0 && x > 3.8, sqrt(-1), 0)\"]
@@ -419,7 +419,7 @@ fn conditions_on_nothing() {
 point of body \"block\", which is at [3.875, 2.875] m; expected a place within a cell of it (0.8839 m)
     |
  43 | point = { nearest = [[4, 3], [50, 3]], force = [0, -1] }
-    |                     ^^^^^^^^^^^^^^^^^^",
+    |                     ^^^^^^^^^^^^^^^^^",
     );
     // A wall ahead of the body may be meant.
     let wall = "\n[[boundary]]\nname = \"wall\"\nwhere = { side = \"right\" }\nfix = [\"x\"]\n";

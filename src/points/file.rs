@@ -11,7 +11,7 @@ use super::Points;
 use super::share::Share;
 
 /// By how much a GIMP domain may exceed a cell: six digits of a volume.
-const SLACK: f64 = 1e-6;
+const SLACK: f64 = 1e-5;
 
 /// Reads this rank's share of the lines; the domain of each point is a square (cube) of its
 /// volume. Returns the number of lines. Errors name file and line; one of a file that cannot be
