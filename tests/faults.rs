@@ -306,7 +306,7 @@ fn formulas_without_a_value_at_the_start() {
     refused(
         &explicit.set("body.0.velocity=[0, \"ln(0.5 - X)\"]"),
         2,
-        "error: --set body.0.velocity=[0, \"ln(0.5 - X)\"]: body.0.velocity: y is NaN m/s at point 8 \
+        "error: --set body.0.velocity=[0, \"ln(0.5 - X)\"]: body.0.velocity: y is NaN m/s at point 4 \
 at [0.625, 0.125] m: the expression is not finite there",
     );
     refused(

@@ -172,8 +172,9 @@ fn a_velocity_that_is_not_a_number_is_named() {
     let run = collision().set("body.0.velocity=[\"sqrt(X - 0.2)\", \"0\"]").ranks(2);
     for run in [run.clone(), implicit(run)] {
         let outcome = run.attempt();
-        assert_says(&outcome, 1, &["step 1", "point ", "not finite"]);
-        assert_keeps(outcome, 0);
+        // Seen before anything is written.
+        assert_says(&outcome, 2, &["body.0.velocity: x is NaN m/s at point ", "not finite"]);
+        assert!(!outcome.folder.path().join("out").exists());
     }
 }
 
