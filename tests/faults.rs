@@ -316,7 +316,7 @@ at [0.625, 0.125] m: the expression is not finite there",
 at [0.0, 3.0] by inf: its expression is not finite there
     |
  40 | displacement = { x = \"if(Y > 2.9, 1/0, 0)\" }
-    |                ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^",
+    |                ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^",
     );
 }
 
