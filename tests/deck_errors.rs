@@ -443,45 +443,6 @@ fn checks_of_conditions_and_results() {
     );
 }
 
-/// Only dynamics has a time: elsewhere `t` would stay 0 and `seconds` would mean the load factor.
-#[test]
-fn time_where_there_is_none() {
-    assert_eq!(
-        replaced("every = 5", "every = { seconds = 0.3 }"),
-        "\
-beam.toml:56:9: output.every: type = \"quasi-static\" has no time
-    |
- 56 | every = { seconds = 0.3 }
-    |         ^^^^^^^^^^^^^^^^^
-   = give a whole number of steps"
-    );
-    let why = "type = \"quasi-static\" has no time t\n   = use the load factor s";
-    expect(
-        BEAM,
-        &[
-            (&["boundary.1.fix=", "boundary.1.displacement={ y = \"0.1*t\" }"], why),
-            (&["load.0.point=", "load.0.body_force=[\"0\", \"sin(t)\"]"], why),
-            (&["verify.0.exact=X*t"], why),
-            (
-                &[
-                    "analysis.type=conditioning",
-                    "boundary.0.fix=",
-                    "boundary.0.displacement.x=\"t\"",
-                ],
-                "type = \"conditioning\" has no time t",
-            ),
-        ],
-    );
-    for set in ["boundary.1.displacement={ y = \"0.1*s\" }", "verify.0.exact=X*s"] {
-        let sets = ["boundary.1.fix=".to_string(), set.to_string()];
-        let keep = usize::from(set.starts_with("verify"));
-        deck::read(Path::new("beam.toml"), BEAM, &sets[keep..]).unwrap_or_else(|e| panic!("{e}"));
-    }
-    let moved = "boundary=[{ where = { side = \"left\" }, displacement = { x = \"t\" } }]";
-    let t = [moved.to_string()];
-    deck::read(Path::new("collision.toml"), COLLISION, &t[..]).unwrap_or_else(|e| panic!("{e}"));
-}
-
 /// By their power of ten, not by three hundred digits.
 #[test]
 fn numbers_that_are_huge_or_tiny() {

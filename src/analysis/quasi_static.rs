@@ -35,7 +35,8 @@ pub fn run<const D: usize>(
 ) -> Result<Ending> {
     let analysis = &model.deck.analysis;
     let steps = analysis.steps.unwrap_or(1);
-    let mut stepping = Stepping::new(steps, 0.0, analysis.on_failure, analysis.smallest_step);
+    // The load factor serves as the time of formulas.
+    let mut stepping = Stepping::new(steps, 1.0, analysis.on_failure, analysis.smallest_step);
     let (mut totals, mut trials) = (Totals::default(), Trials::default());
     match recorder.resumed() {
         Some(state) => {
@@ -88,7 +89,7 @@ pub fn run<const D: usize>(
 /// The first load step of the deck.
 pub fn first_span(deck: &Deck) -> StepSpan {
     let factor_end = 1.0 / deck.analysis.steps.unwrap_or(1) as f64;
-    StepSpan { factor_start: 0.0, factor_end, time_start: 0.0, time_end: 0.0 }
+    StepSpan { factor_start: 0.0, factor_end, time_start: 0.0, time_end: factor_end }
 }
 
 /// Sums over the run so far.
@@ -197,8 +198,6 @@ fn solve_step<const D: usize>(
     let row = HistoryRow {
         step: number,
         load_factor: span.factor_end,
-        time: span.time_end,
-        dt: span.time_end - span.time_start,
         newton_iterations: solved.evaluations,
         residual: solved.residual,
         linear_iterations: solved.linear_iterations,
@@ -257,6 +256,7 @@ pub fn figures<const D: usize>(
     recorder: &mut Recorder,
 ) -> Result<std::collections::BTreeMap<String, f64>> {
     let (factor, time) = recorder.reached;
+    let time = if model.deck.analysis.kind.has_time() { time } else { factor };
     let mut figures = verify::figures(world, &model.deck.verify, points, factor, time)?;
     if let Some(field) = &model.manufactured {
         let materials = &model.materials;

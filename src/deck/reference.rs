@@ -35,8 +35,8 @@ pub fn markdown() -> String {
     out.push_str("## Expressions\n\n");
     out.push_str(
         "A number, or a string with a formula. `X Y Z` is the position at the start, `x y z` the \
-         current one, `s` the load factor from 0 to 1, `t` the time (in dynamics; \
-         the other analyses have none and refuse it); each key says which of them it takes. A \
+         current one, `s` the load factor from 0 to 1, `t` the time (in \
+         analyses that have none the same as `s`); each key says which of them it takes. A \
          formula must have a finite value wherever it is needed: at the start this is checked \
          before anything is written, later it ends the run. Powers bind more tightly than signs (`-x^2` is negative), comparisons and \
          logic give 1 or 0. Known names are\n\n",

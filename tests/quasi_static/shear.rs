@@ -1,6 +1,6 @@
 //! Simple shear to six times the height: Lagrangian §7.2.
 
-use crate::common::run::Run;
+use crate::common::run::{Results, Run};
 
 const UPDATES: [&str; 7] =
     ["none", "det", "normal", "stretch", "corners", "normal-corrected", "normal-incremental"];
@@ -110,4 +110,21 @@ fn plastic_stress_converges_with_the_step() {
     };
     let (coarse, fine) = (error(60), error(120));
     assert!((1.7..2.3).contains(&(coarse / fine)), "{coarse:e} {fine:e}");
+}
+
+/// Where there is no time `t` is the load factor, in boundary values and figures of merit alike.
+#[test]
+fn t_is_the_load_factor() {
+    let run = |name: &str| {
+        basis("mpm")
+            .set(format!("boundary.0.displacement.x=\"6*Y*{name}\""))
+            .set(format!(
+                "verify.0.exact=\"2*10e3/(2*1.3)*ln(3*{name}+sqrt(9*{name}^2+1))/sqrt(1+9*{name}^2)\""
+            ))
+            .results()
+    };
+    let [s, t] = ["s", "t"].map(run);
+    assert!(t.verify("shear_stress") < ROUND_OFF);
+    let stress = |results: &Results| results.points(STEPS).component("stress", 3);
+    assert_eq!(stress(&s), stress(&t));
 }

@@ -165,7 +165,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "displacement",
         header: "boundary.displacement",
-        doc: "Total over the analysis; a value without `s` or `t` is ramped with the load factor. `t` only in dynamics.",
+        doc: "Total over the analysis; a value without `s` or `t` is ramped with the load factor.",
         keys: &[
             key("x", Expression("X Y Z s t"), Optional("free"), "Component x.").unit("m"),
             key("y", Expression("X Y Z s t"), Optional("free"), "Component y.").unit("m"),
@@ -189,7 +189,7 @@ pub const SECTIONS: &[Section] = &[
             key("point", Table("load.point"), Optional("-"), "Force held by material points."),
             key("gravity", Vector, Optional("-"), "Acceleration.").unit("m/s2"),
             key("body_force", Expressions("X Y Z x y z s t"), Optional("-"),
-                "Force per initial volume; without s ramped in quasi-static analyses, which have no t.")
+                "Force per initial volume; without s or t ramped in quasi-static analyses.")
                 .unit("N/m3"),
             key("manufactured", Expressions("X Y Z s"), Optional("-"),
                 "The body force that makes this displacement field exact.").unit("m"),

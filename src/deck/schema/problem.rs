@@ -248,7 +248,7 @@ pub const RESULT_SECTIONS: &[Section] = &[
             "seconds",
             Number,
             Required,
-            "Simulated time between outputs; only in dynamics.",
+            "Simulated time between outputs; without a time, of the load factor.",
         )
         .unit("s")
         .range(POSITIVE)],

@@ -1,7 +1,7 @@
 //! `[[boundary]]` and `[[load]]`.
 
 use super::bodies::World;
-use super::{refuse_time, shapes};
+use super::shapes;
 use crate::deck::model::{Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, Rotation};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -16,7 +16,6 @@ pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got
         }
         names.push(name.clone());
         let axes = &AXES[..world.dimension];
-        let kind = world.analysis.map(|analysis| analysis.kind);
         let place = table.table("where", |t| place(&t, world, bodies));
         let fix = table.choices("fix", axes);
         let displacement = table.table_if("displacement", |t| {
@@ -24,7 +23,6 @@ pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got
             let mut components = Vec::new();
             for (axis, name) in axes.iter().enumerate() {
                 if let Some(value) = t.expression_if(name)? {
-                    refuse_time(&t, name, kind, std::slice::from_ref(&value))?;
                     components.push((axis, value));
                 }
             }
@@ -144,7 +142,6 @@ pub fn loads(
             _ => {
                 let all = table.expressions_if(key, dimension)?;
                 let all = all.ok_or_else(|| table.missing(key, ""))?;
-                refuse_time(&table, key, world.analysis.map(|analysis| analysis.kind), &all)?;
                 Ok(if key == "body_force" { Load::BodyForce(all) } else { Load::Manufactured(all) })
             }
         }

@@ -20,8 +20,7 @@ mod shapes;
 
 use std::path::Path;
 
-use super::expression::{Expression, Variable};
-use super::model::{AnalysisType, Deck};
+use super::model::Deck;
 use super::places::Places;
 use super::problems::{Got, Problems};
 use super::reader::Table;
@@ -38,7 +37,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let method = root
         .table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok(), kind));
     let materials = bodies::materials(&root, kind);
-    let output = root.table_or_default("output", |table| results::output(&table, kind));
+    let output = root.table_or_default("output", |table| results::output(&table));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = results::petsc(&root);
     // Without the grid the dimension is unknown, and nothing below can be judged.
@@ -55,7 +54,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let names = bodies::names(&root);
     let boundaries = conditions::boundaries(&root, &world, &names);
     let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
-    let verify = results::verify(&root, dimension, kind);
+    let verify = results::verify(&root, dimension);
     if let (Ok(method), Ok(boundaries)) = (&method, &boundaries) {
         let grid_problems = root.table("grid", |table| {
             grid::check_basis(&table, &grid, method)?;
@@ -87,23 +86,4 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     };
     grid::make_finite_elements(&root, &mut deck)?;
     Ok(deck)
-}
-
-/// Reports the time `t` in a formula of an analysis that has none: it would stay 0.
-fn refuse_time(
-    table: &Table<'_>,
-    key: &str,
-    kind: Option<AnalysisType>,
-    formulas: &[Expression],
-) -> Got<()> {
-    match kind.filter(|kind| !kind.has_time()) {
-        Some(kind) if formulas.iter().any(|formula| formula.depends_on(Variable::Time)) => {
-            Err(table.problem_with_help(
-                key,
-                format!("type = \"{}\" has no time t", kind.name()),
-                "use the load factor s, which goes from 0 to 1",
-            ))
-        }
-        _ => Ok(()),
-    }
 }

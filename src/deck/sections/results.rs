@@ -2,15 +2,13 @@
 
 use crate::deck::expression::Expression;
 use crate::deck::fields::{FIELD_NAMES, FIELDS, FieldRank};
-use crate::deck::model::{AnalysisType, Checkpoint, Every, Output, Parallel, Verify};
+use crate::deck::model::{Checkpoint, Every, Output, Parallel, Verify};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{self, at_least};
 use crate::deck::tree::Value;
 
-use super::refuse_time;
-
-pub fn verify(root: &Table<'_>, dimension: usize, kind: Option<AnalysisType>) -> Got<Vec<Verify>> {
+pub fn verify(root: &Table<'_>, dimension: usize) -> Got<Vec<Verify>> {
     let mut names: Vec<String> = Vec::new();
     root.tables("verify", |_, table| {
         let name = table.text("name");
@@ -18,15 +16,14 @@ pub fn verify(root: &Table<'_>, dimension: usize, kind: Option<AnalysisType>) ->
         let norm = table.choice("norm");
         let scale = table.number("scale");
         let (field, components) = components?;
-        let exact = exact(&table, &field, components)?;
-        refuse_time(&table, "exact", kind, &exact)?;
+        let exact = exact(&table, &field, components);
         let name = name?;
         if names.contains(&name) {
             let message = format!("another figure of merit is called \"{name}\"");
             return Err(table.problem("name", message));
         }
         names.push(name.clone());
-        Ok(Verify { name, field, exact, norm: norm?, scale: scale? })
+        Ok(Verify { name, field, exact: exact?, norm: norm?, scale: scale? })
     })
 }
 
@@ -73,9 +70,8 @@ fn exact(table: &Table<'_>, field: &str, components: usize) -> Got<Vec<Expressio
     }
 }
 
-/// `kind` of the analysis, if it could be read.
-pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
-    let every = every(table, kind);
+pub fn output(table: &Table<'_>) -> Got<Output> {
+    let every = every(table);
     let fields = table.choices("fields", FIELD_NAMES);
     let checkpoint = table.table_if("checkpoint", |t| {
         let (every, minutes, keep) = (t.count_if("every"), t.number_if("minutes"), t.count("keep"));
@@ -90,17 +86,10 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
     Ok(Output { every: every?, fields, checkpoint: checkpoint? })
 }
 
-fn every(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Every> {
+fn every(table: &Table<'_>) -> Got<Every> {
     let Some(node) = table.node("every") else { return Ok(Every::Steps(1)) };
     match &node.value {
         Value::Table(_) => {
-            if let Some(kind) = kind.filter(|kind| !kind.has_time()) {
-                return Err(table.problem_with_help(
-                    "every",
-                    format!("type = \"{}\" has no time", kind.name()),
-                    "give a whole number of steps",
-                ));
-            }
             let path = table.full("every");
             let section = schema::section("output.every");
             let time = Table::open(table.problems(), section, &path, node)?;
