@@ -71,20 +71,13 @@ fn refused(run: &Run, message: &str) {
     refused_on(&[1, 2, 3], run, message);
 }
 
-/// A piece of the body that nothing holds, on a rank of its own.
+/// A piece of the body that may turn about the one node by which it hangs, which is not seen before
+/// solving.
 fn loose_piece() -> Run {
     block().set("method.basis=mpm").set("body.0.points_per_cell=1").set(
         "body.0.shape={ union = [{ box = { min = [0, 0], max = [1, 1] } }, \
-         { box = { min = [2, 2], max = [2.5, 2.5] } }] }",
+         { box = { min = [1, 1], max = [1.5, 1.5] } }] }",
     )
-}
-
-/// A mechanism: too few points for the cells' modes.
-fn sparse_points() -> Run {
-    let piece = "points_per_cell = [2, 2]";
-    assert!(BLOCK.contains(piece));
-    let lattice = "lattice = { spacing = 1.0, offset = [0.25, 0.25] }";
-    Run::text(&BLOCK.replace(piece, lattice)).set("method.basis=mpm")
 }
 
 const SINGULAR: &str =
@@ -99,12 +92,10 @@ results: out, good up to step 0";
 /// The factors are one rank's, and only that rank sees that they do not exist.
 #[test]
 fn a_singular_system_ends_all_ranks_with_one_message() {
-    for run in [loose_piece(), sparse_points()] {
-        for ranks in [1, 2, 3] {
-            let outcome = run.clone().ranks(ranks).attempt();
-            assert_eq!(said(&outcome), SINGULAR, "on {ranks} ranks");
-            assert_eq!(outcome.code, 1, "on {ranks} ranks");
-        }
+    for ranks in [1, 2, 3] {
+        let outcome = loose_piece().ranks(ranks).attempt();
+        assert_eq!(said(&outcome), SINGULAR, "on {ranks} ranks");
+        assert_eq!(outcome.code, 1, "on {ranks} ranks");
     }
 }
 
@@ -120,19 +111,24 @@ fn a_singular_system_is_tried_again_in_smaller_steps() {
     }
 }
 
-/// Solvers inside solvers that run on some ranks only.
+/// Solvers inside solvers that run on some ranks only. The last level of multigrid has factors for this
+/// matrix, and the iteration runs away.
 #[test]
-fn a_singular_system_fails_in_blocks_and_on_coarse_levels_too() {
-    for words in [
-        "-qs_ksp_type preonly -qs_pc_type bjacobi -qs_sub_pc_type lu",
-        "-qs_ksp_type cg -qs_pc_type bjacobi -qs_sub_pc_type lu",
-        "-qs_ksp_type preonly -qs_pc_type redundant",
-        "-qs_ksp_type cg -qs_pc_type mg -qs_ksp_max_it 40",
+fn a_singular_system_fails_in_blocks_and_under_multigrid_too() {
+    let run_away = SINGULAR.replace(
+        "DIVERGED_PC_FAILED (zero pivot: the matrix is singular) after 0 iterations",
+        "DIVERGED_DTOL after 1 iterations",
+    );
+    for (words, message) in [
+        ("-qs_ksp_type preonly -qs_pc_type bjacobi -qs_sub_pc_type lu", SINGULAR),
+        ("-qs_ksp_type cg -qs_pc_type bjacobi -qs_sub_pc_type lu", SINGULAR),
+        ("-qs_ksp_type preonly -qs_pc_type redundant", SINGULAR),
+        ("-qs_ksp_type cg -qs_pc_type mg -qs_ksp_max_it 40", &run_away),
     ] {
         for ranks in [2, 3] {
             let run = words.split(' ').fold(loose_piece(), |run, word| run.word(word));
             let outcome = run.ranks(ranks).attempt();
-            assert_eq!(said(&outcome), SINGULAR, "{words} on {ranks} ranks");
+            assert_eq!(said(&outcome), message, "{words} on {ranks} ranks");
             assert_eq!(outcome.code, 1, "{words} on {ranks} ranks");
         }
     }

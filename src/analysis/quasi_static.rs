@@ -5,10 +5,9 @@ use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::map_forces;
 use crate::deck::Deck;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::output::RunState;
 use crate::output::history::HistoryRow;
-use crate::output::summary::Status;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
@@ -266,9 +265,4 @@ pub fn figures<const D: usize>(
         recorder.log.say(warning);
     }
     Ok(figures.values)
-}
-
-/// A run that failed, as the error the command line reports.
-pub fn as_error(ending: &Ending) -> Option<Error> {
-    (!matches!(ending.status, Status::Completed)).then(|| Error::Run(ending.reason.clone()))
 }
