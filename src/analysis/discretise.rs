@@ -269,19 +269,19 @@ impl<const D: usize> Discretisation<D> {
     }
 }
 
-/// The populated cells and the nodes at them: all that is known of a step's system before it is
-/// built. Collective.
+/// The populated cells and the nodes at them, numbered: all that is known of a step's system before
+/// it is built. Collective.
 pub fn active<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
-) -> Result<(Populated, Touched)> {
+) -> Result<(Populated, Numbering)> {
     let (grid, partition) = (&model.grid, &model.partition);
     let populated = Populated::find(world, grid, partition, model.deck.method.basis, points, None)?;
     let mut reached = Vec::new();
     append_nodes(world, grid, &populated, &mut reached);
     let touched = Touched::settle(world, grid, partition, reached)?;
-    Ok((populated, touched))
+    Ok((populated, Numbering::build(world, touched.owned, &touched.foreign)?))
 }
 
 /// Appends the nodes of the populated cells owned or reached here.

@@ -317,10 +317,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
     /// Whether the error has stopped falling, at the round-off of the forces that the residual is
     /// the difference of: no better solver or smaller step would bring it down.
     pub fn stuck_at_round_off(&self) -> bool {
-        let cell = match self.grid {
-            Grid::Lattice(lattice) => lattice.spacing.iter().fold(0.0, |a: f64, b| a.max(*b)),
-            Grid::Mesh(mesh) => mesh.cell_size(),
-        };
+        let cell = self.grid.cell_size();
         // Strains carry the round-off of F = 1 + grad u, forces that of stresses on a cell.
         let strained = self.diagonal_scale * cell * ((self.numbering.total * D) as f64).sqrt();
         let round_off = f64::EPSILON * (strained + self.actions_norm);

@@ -4,7 +4,6 @@
 use crate::assembly::Numbering;
 use crate::assembly::conditions::{Conditions, StepSpan};
 use crate::assembly::external::scope_of;
-use crate::assembly::numbering::Touched;
 use crate::deck::figure;
 use crate::deck::model::{AnalysisType, Deck, Load, Place};
 use crate::deck::schema::AXES;
@@ -22,14 +21,14 @@ pub fn check<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
-    nodes: &Touched,
+    numbering: &Numbering,
 ) -> Result<Vec<String>> {
     let span = first_span(&model.deck);
     velocities(world, &model.deck, points)?;
     if model.deck.analysis.kind != AnalysisType::Conditioning {
         loads(world, model, points, span)?;
     }
-    boundaries(world, model, points, nodes, span)
+    boundaries(world, model, points, numbering, span)
 }
 
 /// The first step; with a step that follows the stability limit only its begin is known.
@@ -124,11 +123,10 @@ fn boundaries<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
-    nodes: &Touched,
+    numbering: &Numbering,
     span: StepSpan,
 ) -> Result<Vec<String>> {
     let (deck, grid) = (&model.deck, &model.grid);
-    let numbering = Numbering::build(world, nodes.owned.clone(), &nodes.foreign)?;
     let mut warnings = Vec::new();
     for (index, boundary) in deck.boundaries.iter().enumerate() {
         if let Place::Box { min, max } = &boundary.place
@@ -139,7 +137,7 @@ fn boundaries<const D: usize>(
         }
         let alone = std::slice::from_ref(boundary);
         let basis = deck.method.basis;
-        let found = Conditions::evaluate(world, grid, basis, &numbering, points, alone, span);
+        let found = Conditions::evaluate(world, grid, basis, numbering, points, alone, span);
         let found = found.map_err(|error| match error {
             Error::Input(text) => {
                 Error::Input(deck.places.say(&format!("boundary.{index}.displacement"), &text))
@@ -198,9 +196,7 @@ fn of_first_point<const D: usize, F>(
 ) -> Option<String> {
     let faulty = (0..points.len()).filter_map(|p| Some((points.id[p], p, fault(p)?)));
     let own = faulty.min_by_key(|(id, ..)| *id);
-    let first = world.min_u64(own.as_ref().map_or(u64::MAX, |(id, ..)| *id));
-    let own = own.filter(|(id, ..)| *id == first);
-    world.first_message(own.map(|(_, p, fault)| say(p, fault)))
+    world.lowest_message(own.map(|(id, p, fault)| (id, say(p, fault))))
 }
 
 fn place<const D: usize>(points: &Points<D>, p: usize) -> String {

@@ -1,7 +1,6 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
-use crate::assembly::Populated;
-use crate::assembly::numbering::Touched;
+use crate::assembly::{Numbering, Populated};
 use crate::deck::model::{Basis, Every};
 use crate::output::report::Plan;
 use crate::parallel::World;
@@ -16,10 +15,10 @@ pub fn of<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
-    (populated, touched): &(Populated, Touched),
+    (populated, numbering): &(Populated, Numbering),
 ) -> Plan {
     let deck = &model.deck;
-    let nodes = world.sum_usize(touched.owned.len());
+    let nodes = numbering.total;
     let all_points = world.sum_usize(points.len());
     let mut per_rank = vec![0.0; world.size()];
     per_rank[world.rank()] = points.len() as f64;

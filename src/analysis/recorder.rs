@@ -185,8 +185,8 @@ impl Recorder {
         self.log.attach(&self.directory, self.same_directory, comm)?;
         self.points.cut(comm)?;
         self.grid.cut(comm)?;
-        self.history.open(comm)?;
-        self.residuals.open(comm)
+        self.history.table.open(comm)?;
+        self.residuals.table.open(comm)
     }
 
     /// What the time loop saved with [`Self::end_step`] before the run was interrupted; `None`
@@ -262,8 +262,8 @@ impl Recorder {
         self.save(&mut state);
         model.balance.save(&mut state);
         // A checkpoint counts on its rows: they are to outlast a power cut if it does.
-        self.history.sync(world.comm())?;
-        self.residuals.sync(world.comm())?;
+        self.history.table.sync(world.comm())?;
+        self.residuals.table.sync(world.comm())?;
         let step = self.steps_completed;
         let path = self.checkpointer.write(world, step, model, points, &state)?;
         self.log.note(&format!("checkpoint: {}", path.display()));
@@ -271,12 +271,13 @@ impl Recorder {
     }
 
     fn save(&self, state: &mut RunState) {
+        let (history, residuals) = (self.history.table.mark(), self.residuals.table.mark());
         for (name, value) in [
             ("recorder.steps", self.steps_completed),
-            ("recorder.history_rows", self.history.mark().rows),
-            ("recorder.history_step", self.history.mark().step),
-            ("recorder.residual_rows", self.residuals.mark().rows),
-            ("recorder.residual_step", self.residuals.mark().step),
+            ("recorder.history_rows", history.rows),
+            ("recorder.history_step", history.step),
+            ("recorder.residual_rows", residuals.rows),
+            ("recorder.residual_step", residuals.step),
             ("recorder.newton_total", self.newton.total),
             ("recorder.newton_max", self.newton.max),
             ("recorder.linear_total", self.linear.total),

@@ -29,25 +29,30 @@ pub fn require<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
-    (populated, nodes): &(Populated, Touched),
+    (populated, numbering): &(Populated, Numbering),
     first: StepSpan,
 ) -> Result<()> {
     let (deck, grid, partition) = (&model.deck, &model.grid, &model.partition);
     let faces = ties(world, model, populated)?;
-    let known = nodes.owned.iter().chain(nodes.foreign.iter().map(|(_, node)| node));
-    let tied = faces.iter().flat_map(|face| &face.nodes);
-    let nodes = Touched::settle(world, grid, partition, known.chain(tied).copied().collect())?;
-    let numbering = Numbering::build(world, nodes.owned, &nodes.foreign)?;
+    let with_ties;
+    let numbering = if grid.element().is_simplex() {
+        let nodes = numbering.nodes.iter().chain(faces.iter().flat_map(|face| &face.nodes));
+        let nodes = Touched::settle(world, grid, partition, nodes.copied().collect())?;
+        with_ties = Numbering::build(world, nodes.owned, &nodes.foreign)?;
+        &with_ties
+    } else {
+        numbering
+    };
     let conditions = Conditions::evaluate(
         world,
         grid,
         deck.method.basis,
-        &numbering,
+        numbering,
         points,
         &deck.boundaries,
         first,
     )?;
-    let pieces = pieces::labels(world, grid, populated, &faces, &numbering)?;
+    let pieces = pieces::labels(world, grid, populated, &faces, numbering)?;
     let (middle, length) = extent(world, points);
     let motions = D + D * (D - 1) / 2;
     let mut grams: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
@@ -73,7 +78,7 @@ pub fn require<const D: usize>(
     let first = world.min_u64(free.as_ref().map_or(u64::MAX, |(piece, _)| *piece));
     let motion = free.filter(|(piece, _)| *piece == first).map(|(_, motion)| motion);
     let Some(motion) = world.first_message(motion) else { return Ok(()) };
-    let what = name_piece(world, model, points, &numbering, &pieces, first)?;
+    let what = name_piece(world, model, points, numbering, &pieces, first)?;
     Err(Error::Input(format!(
         "{what} can {motion} freely: no boundary holds the nodes around it against this, so that \
          the quasi-static system is singular; check the places and components of [[boundary]]"

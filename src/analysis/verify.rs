@@ -87,9 +87,7 @@ pub fn figures<const D: usize>(
             VerifyNorm::VolumeL2 => (sum / total_volume).sqrt() / entry.scale,
             VerifyNorm::Max => world.max(worst) / entry.scale,
         };
-        let first = world.min_u64(without.as_ref().map_or(u64::MAX, |(id, _)| *id));
-        let own = without.filter(|(id, _)| *id == first).map(|(_, why)| why);
-        figures.insert(entry.name.clone(), value, world.first_message(own));
+        figures.insert(entry.name.clone(), value, world.lowest_message(without));
     }
     Ok(figures)
 }

@@ -150,11 +150,11 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
 #[derive(Debug)]
 pub struct History {
     layout: Layout,
-    table: CsvTable,
+    pub table: CsvTable,
 }
 
 impl History {
-    /// A new history. Nothing is written before [`Self::open`].
+    /// A new history. Nothing is written before [`CsvTable::open`].
     pub fn create(directory: &ResultsDirectory, layout: Layout) -> Result<Self> {
         let table = CsvTable::create(&directory.file(HISTORY), &header(&layout))?;
         Ok(Self { layout, table })
@@ -171,21 +171,6 @@ impl History {
         let path = directory.file(HISTORY);
         let table = CsvTable::resume(&path, &header(&layout), mark, log, comm)?;
         Ok(Self { layout, table })
-    }
-
-    /// [`CsvTable::open`]
-    pub fn open(&mut self, comm: &SimpleCommunicator) -> Result<()> {
-        self.table.open(comm)
-    }
-
-    /// [`CsvTable::sync`]
-    pub fn sync(&self, comm: &SimpleCommunicator) -> Result<()> {
-        self.table.sync(comm)
-    }
-
-    /// [`CsvTable::mark`]
-    pub fn mark(&self) -> Mark {
-        self.table.mark()
     }
 
     /// Appends a row; it is on its way to the disk when this returns.

@@ -10,11 +10,11 @@ use crate::error::Result;
 /// The open list of residuals.
 #[derive(Debug)]
 pub struct Residuals {
-    table: CsvTable,
+    pub table: CsvTable,
 }
 
 impl Residuals {
-    /// A new list. Nothing is written before [`Self::open`].
+    /// A new list. Nothing is written before [`CsvTable::open`].
     pub fn create(directory: &ResultsDirectory) -> Result<Self> {
         Ok(Self { table: CsvTable::create(&directory.file(RESIDUALS), &header())? })
     }
@@ -28,21 +28,6 @@ impl Residuals {
     ) -> Result<Self> {
         let path = directory.file(RESIDUALS);
         Ok(Self { table: CsvTable::resume(&path, &header(), mark, log, comm)? })
-    }
-
-    /// [`CsvTable::open`]
-    pub fn open(&mut self, comm: &SimpleCommunicator) -> Result<()> {
-        self.table.open(comm)
-    }
-
-    /// [`CsvTable::sync`]
-    pub fn sync(&self, comm: &SimpleCommunicator) -> Result<()> {
-        self.table.sync(comm)
-    }
-
-    /// [`CsvTable::mark`]
-    pub fn mark(&self) -> Mark {
-        self.table.mark()
     }
 
     /// Appends the residuals of one step; the first belongs to iteration 0, at zero displacement.

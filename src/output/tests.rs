@@ -230,8 +230,8 @@ fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
     })
     .unwrap();
     assert_eq!(history.push(&row(1), comm).unwrap_err().exit_code(), 3);
-    history.open(comm).unwrap();
-    residuals.open(comm).unwrap();
+    history.table.open(comm).unwrap();
+    residuals.table.open(comm).unwrap();
     for step in 1..=4 {
         history.push(&row(step), comm).unwrap();
         residuals.push_step(step, &[1.0, 1e-10], comm).unwrap();
@@ -240,8 +240,8 @@ fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
     let mut history = History::resume(&directory, layout(), mark, &mut log, comm).unwrap();
     let mark = Mark { rows: 4, step: 2 };
     let mut residuals = Residuals::resume(&directory, mark, &mut log, comm).unwrap();
-    history.open(comm).unwrap();
-    residuals.open(comm).unwrap();
+    history.table.open(comm).unwrap();
+    residuals.table.open(comm).unwrap();
     history.push(&row(3), comm).unwrap();
     residuals.push_step(3, &[0.25], comm).unwrap();
     Summary { ranks: comm.size() as usize, ..Default::default() }.write(&directory, comm).unwrap();

@@ -141,6 +141,12 @@ impl World {
         reducing(|| process.broadcast_into(&mut bytes[..]));
     }
 
+    /// The message with the lowest number, on all ranks.
+    pub fn lowest_message(&self, own: Option<(u64, String)>) -> Option<String> {
+        let lowest = self.min_u64(own.as_ref().map_or(u64::MAX, |(number, _)| *number));
+        self.first_message(own.filter(|(number, _)| *number == lowest).map(|(_, text)| text))
+    }
+
     /// The message of the lowest rank that has one, on all ranks.
     pub fn first_message(&self, message: Option<String>) -> Option<String> {
         let speaker = self.min_u64(match message {

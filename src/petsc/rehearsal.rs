@@ -53,7 +53,7 @@ impl Rehearsal {
         Ok((!given.is_empty()).then_some(Rehearsal { given }))
     }
 
-    /// Solves a linear system with blocks of size `D` by what `make` returns for a prefix.
+    /// Solves the small system in blocks of size `D` by what `make` returns for a prefix.
     /// Whether it converges does not matter. Collective.
     ///
     /// # Errors
