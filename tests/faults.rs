@@ -6,54 +6,11 @@ mod program;
 
 use std::fs;
 
-use common::run::{Outcome, PointTable, Run};
+use common::run::{PointTable, Run};
 use program::{Running, wait_until};
 
 /// A soft block on smooth ground under its own weight.
-const BLOCK: &str = r#"title = "Block"
-
-[analysis]
-type = "quasi-static"
-steps = 2
-tolerance = 1e-9
-
-[method]
-basis = "gimp"
-domain_update = "stretch"
-
-[ghost]
-stiffness_factor = 1.0
-
-[grid]
-type = "lattice"
-size = [6, 4]
-h = 0.5
-
-[material.soil]
-model = "hencky"
-young = 1e6
-poisson = 0.3
-
-[[body]]
-name = "block"
-material = "soil"
-density = 1000.0
-shape = { box = { min = [0, 0], max = [4, 3] } }
-points_per_cell = [2, 2]
-
-[[boundary]]
-name = "ground"
-where = { side = "bottom" }
-fix = ["y"]
-
-[[boundary]]
-name = "symmetry"
-where = { side = "left" }
-fix = ["x"]
-
-[[load]]
-gravity = [0, -20]
-"#;
+const BLOCK: &str = include_str!("decks/block.toml");
 
 fn block() -> Run {
     Run::text(BLOCK)
@@ -65,19 +22,12 @@ fn replaced(from: &str, to: &str) -> Run {
     Run::text(&BLOCK.replacen(from, to, 1))
 }
 
-/// What the program said on its error channel, without what mpirun adds.
-fn said(outcome: &Outcome) -> String {
-    let text = outcome.stderr.split("-----").next().unwrap_or_default();
-    let scratch = format!("{}/", outcome.folder.path().display());
-    text.trim_end().replace(&scratch, "")
-}
-
 /// The same message and code on one and two ranks, and no file but those that were there.
 #[track_caller]
 fn refused(run: &Run, code: i32, message: &str) {
     for ranks in [1, 2] {
         let outcome = run.clone().ranks(ranks).attempt();
-        assert_eq!(said(&outcome), message, "on {ranks} ranks");
+        assert_eq!(outcome.said(), message, "on {ranks} ranks");
         assert_eq!(outcome.code, code, "on {ranks} ranks: {message}");
         let left = outcome.files();
         assert!(left.is_empty() || left == ["deck.toml"], "half-written: {left:?}");
@@ -177,7 +127,7 @@ with basis = \"gimp\" a domain may not be larger than a cell, found 0.6 m
 fn points_refused(content: &str, message: &str) {
     for ranks in [1, 2] {
         let outcome = with_points().ranks(ranks).attempt_in(beside(content));
-        assert_eq!(said(&outcome), message, "on {ranks} ranks");
+        assert_eq!(outcome.said(), message, "on {ranks} ranks");
         assert_eq!(outcome.code, 2, "on {ranks} ranks: {message}");
         assert_eq!(outcome.files(), ["deck.toml", "points.csv"], "half-written");
     }
@@ -254,7 +204,7 @@ directory (os error 2)
     // Six digits of a third are not a wrong deck.
     let third = with_points().set("grid.h=0.333333333333333333").word("--check");
     let outcome = third.attempt_in(beside("x,y,volume\n0.2,0.1,0.111111\n0.5,0.1,0.111112\n"));
-    assert!(!said(&outcome).contains("domain"), "{}", outcome.stderr);
+    assert!(!outcome.said().contains("domain"), "{}", outcome.stderr);
 }
 
 /// The velocities of a file of points are theirs, unless the deck gives the body one.
@@ -338,7 +288,7 @@ against this, so that the quasi-static system is singular; check the places and 
     let slides = boxes(&format!("{beside}, {{ box = {{ min = [4, 0], max = [5, 1] }} }}"));
     let outcome = block().set(&slides).ranks(2).attempt();
     assert_eq!(outcome.code, 2, "{}", outcome.stderr);
-    assert!(said(&outcome).contains("point 32 at [4.125, 0.125] m, can move along x freely"));
+    assert!(outcome.said().contains("point 32 at [4.125, 0.125] m, can move along x freely"));
     // Rough ground holds both; so does a touch at one node, as far as can be seen.
     let rough = block().set(&slides).set("boundary.0.fix=[\"x\", \"y\"]").word("--check");
     let touching = boxes(&format!("{beside}, {{ box = {{ min = [2, 1], max = [3, 2] }} }}"));
@@ -362,7 +312,7 @@ against this, so that the quasi-static system is singular; check the places and 
     assert_eq!(stack(1.0).word("--check").attempt().code, 0);
     let apart = stack(2.0).attempt();
     assert_eq!(apart.code, 2);
-    assert!(said(&apart).starts_with("error: body \"upper\" can move along y freely: "));
+    assert!(apart.said().starts_with("error: body \"upper\" can move along y freely: "));
 }
 
 /// A strip that goes up and down through slabs of the grid: each rank sees several pieces of what
@@ -394,7 +344,7 @@ fn pieces_that_other_ranks_join() {
             assert_eq!(whole.code, 0, "{ranks} ranks: {}", whole.stderr);
             let parted = strip(&[0, 1, 3], upright).ranks(ranks).attempt();
             assert_eq!(parted.code, 2, "{ranks} ranks: {}", parted.stdout);
-            let text = said(&parted);
+            let text = parted.said();
             assert!(text.starts_with("error: a piece of body \"block\" that shares no"), "{text}");
             assert!(text.contains(&format!(" at {far} m, can move along x freely")), "{text}");
         }
@@ -472,7 +422,7 @@ fn problems_larger_than_the_machine() {
     ] {
         for ranks in [1, 2] {
             let outcome = run.clone().ranks(ranks).attempt();
-            let text = said(&outcome);
+            let text = outcome.said();
             assert_eq!(outcome.code, 2, "{text}");
             let start = format!("error: the problem is too large: {size}");
             assert!(text.starts_with(&start), "{text}");
@@ -551,7 +501,7 @@ fn results_that_are_in_the_way() {
         let second = run.attempt_in(first.folder);
         assert_eq!(second.code, 2);
         assert_eq!(
-            said(&second),
+            second.said(),
             format!(
                 "error: out already holds results ({} files, e.g. domains.xdmf): give --force to \
                  replace them, --out DIR to write elsewhere, or --restart last to continue",
@@ -600,7 +550,7 @@ fn one_rank_that_fails_ends_all() {
         .ranks(ranks)
         .attempt();
         assert_eq!(outcome.code, 1, "{}", outcome.stderr);
-        let text = said(&outcome);
+        let text = outcome.said();
         assert_eq!(text.matches("error: ").count(), 1, "{text}");
         assert!(text.starts_with("error: step 2: the load on point "), "{text}");
         assert!(text.contains("is not finite ([0.0, NaN] N at s = 1)"), "{text}");
@@ -625,7 +575,7 @@ fn formulas_that_lose_their_value_later() {
             .set("load=[{ body_force = [\"0\", \"if(t > 0.0105, sqrt(-1), -2e4)\"] }]");
         for ranks in [1, 2] {
             let outcome = run.clone().ranks(ranks).attempt();
-            let text = said(&outcome);
+            let text = outcome.said();
             assert_eq!(outcome.code, 1, "{text}");
             assert!(text.starts_with(&format!("error: {step}the load on point ")), "{text}");
             assert!(text.contains("check the expressions of [[load]]"), "{text}");

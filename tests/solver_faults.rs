@@ -4,55 +4,15 @@
 
 mod common;
 
-use common::run::{Outcome, Run};
+use common::run::Run;
 
 /// A soft block on smooth ground under its own weight, without Ghost stiffness.
-const BLOCK: &str = r#"title = "Block"
-[analysis]
-type = "quasi-static"
-steps = 2
-[method]
-basis = "gimp"
-domain_update = "stretch"
-[grid]
-type = "lattice"
-size = [6, 4]
-h = 0.5
-[material.soil]
-model = "hencky"
-young = 1e6
-poisson = 0.3
-[[body]]
-name = "block"
-material = "soil"
-density = 1000.0
-shape = { box = { min = [0, 0], max = [4, 3] } }
-points_per_cell = [2, 2]
-[[boundary]]
-name = "ground"
-where = { side = "bottom" }
-fix = ["y"]
-[[boundary]]
-name = "symmetry"
-where = { side = "left" }
-fix = ["x"]
-[[load]]
-gravity = [0, -20]
-"#;
-
 fn block() -> Run {
-    Run::text(BLOCK)
+    Run::text(include_str!("decks/block.toml")).set("ghost=")
 }
 
 fn with(words: &str) -> Run {
     words.split_whitespace().fold(block(), |run, word| run.word(word))
-}
-
-/// What the program said on its error channel, without what mpirun adds.
-fn said(outcome: &Outcome) -> String {
-    let text = outcome.stderr.split("-----").next().unwrap_or_default();
-    let scratch = format!("{}/", outcome.folder.path().display());
-    text.trim_end().replace(&scratch, "")
 }
 
 /// Refused as bad input with this message, on `ranks`, and nothing is left.
@@ -60,7 +20,7 @@ fn said(outcome: &Outcome) -> String {
 fn refused_on(ranks: &[usize], run: &Run, message: &str) {
     for &ranks in ranks {
         let outcome = run.clone().ranks(ranks).attempt();
-        assert_eq!(said(&outcome), message, "on {ranks} ranks");
+        assert_eq!(outcome.said(), message, "on {ranks} ranks");
         assert_eq!(outcome.code, 2, "on {ranks} ranks: {message}");
         assert_eq!(outcome.files(), ["deck.toml"], "on {ranks} ranks: {message}");
     }
@@ -94,7 +54,7 @@ results: out, good up to step 0";
 fn a_singular_system_ends_all_ranks_with_one_message() {
     for ranks in [1, 2, 3] {
         let outcome = loose_piece().ranks(ranks).attempt();
-        assert_eq!(said(&outcome), SINGULAR, "on {ranks} ranks");
+        assert_eq!(outcome.said(), SINGULAR, "on {ranks} ranks");
         assert_eq!(outcome.code, 1, "on {ranks} ranks");
     }
 }
@@ -128,7 +88,7 @@ fn a_singular_system_fails_in_blocks_and_under_multigrid_too() {
         for ranks in [2, 3] {
             let run = words.split(' ').fold(loose_piece(), |run, word| run.word(word));
             let outcome = run.ranks(ranks).attempt();
-            assert_eq!(said(&outcome), message, "{words} on {ranks} ranks");
+            assert_eq!(outcome.said(), message, "{words} on {ranks} ranks");
             assert_eq!(outcome.code, 1, "{words} on {ranks} ranks");
         }
     }
@@ -256,7 +216,7 @@ fn files_that_fail_at_the_start_and_at_the_end() {
             std::os::unix::fs::symlink("nowhere/x", folder.path().join("link")).unwrap();
             let outcome = with(words).ranks(ranks).attempt_in(folder);
             // mpirun may add words of its own on how hard it is to stop all.
-            let text = said(&outcome);
+            let text = outcome.said();
             let first = text.lines().next();
             let expected = format!("error: PETSc {message}");
             assert_eq!(first, Some(&expected[..]), "{words} on {ranks} ranks: {text}");
@@ -276,7 +236,7 @@ fn a_residual_at_round_off_is_told_to_raise_the_tolerance() {
             ("analysis.max_iterations=2", false),
         ] {
             let outcome = block().set(set).ranks(ranks).attempt();
-            let text = said(&outcome);
+            let text = outcome.said();
             assert_eq!(outcome.code, 1, "{text}");
             let found =
                 text.contains("try: raise analysis.tolerance: the residual no longer falls");

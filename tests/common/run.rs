@@ -171,6 +171,13 @@ impl Outcome {
         Results::read(self.folder, "out")
     }
 
+    /// What the program said on its error channel, without what mpirun adds.
+    pub fn said(&self) -> String {
+        let text = self.stderr.split("-----").next().unwrap_or_default();
+        let scratch = format!("{}/", self.folder.path().display());
+        text.trim_end().replace(&scratch, "")
+    }
+
     /// Every file below the scratch folder, relative, sorted.
     pub fn files(&self) -> Vec<String> {
         fn walk(root: &Path, folder: &Path, found: &mut Vec<String>) {
