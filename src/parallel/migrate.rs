@@ -9,7 +9,7 @@ use crate::grid::Grid;
 use crate::points::Points;
 use crate::points::seed::CellByCell;
 use crate::points::share::Share;
-use crate::points::sort::sort_by_cell;
+use crate::points::sort::{sort_by_cell, take_places};
 
 /// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns
 /// how many changed rank, over all ranks. Collective. Error, the same on all ranks: a point outside
@@ -35,7 +35,7 @@ pub fn migrate_from<const D: usize>(
     let leaving = leaving(world, partition, grid, &cells);
     let moved = world.sum_usize(leaving.len());
     if moved == 0 {
-        sort_by_cell(points, &cells, None);
+        sort_by_cell(points, &cells);
         return Ok(0);
     }
     let own = points.len();
@@ -47,7 +47,7 @@ pub fn migrate_from<const D: usize>(
     }
     // The sender located the same position with the same arithmetic.
     append_cells(grid, points, &mut cells)?;
-    sort_by_cell(points, &cells, Some(staying(own, points.len(), &leaving)));
+    take_places(points, &mut cells, &places(&leaving), own);
     Ok(moved)
 }
 
@@ -94,14 +94,12 @@ pub fn settle<const D: usize>(
         cells.truncate(own);
         return migrate_from(world, partition, grid, points, cells);
     }
-    sort_by_cell(points, &cells, Some(staying(own, points.len(), &leaving)));
+    take_places(points, &mut cells, &places(&leaving), own);
     Ok(moved)
 }
 
-/// The points that stay of `own`, and those that came after them.
-fn staying(own: usize, all: usize, leaving: &[(usize, usize)]) -> Vec<usize> {
-    let mut gone = leaving.iter().map(|&(p, _)| p).peekable();
-    (0..own).filter(|p| gone.next_if_eq(p).is_none()).chain(own..all).collect()
+fn places(leaving: &[(usize, usize)]) -> Vec<usize> {
+    leaving.iter().map(|&(p, _)| p).collect()
 }
 
 /// The cells of the points beyond those that are known.

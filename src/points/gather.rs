@@ -1,29 +1,24 @@
 //! The values of a field in another order, without fresh memory for every field: pages that the
-//! system has to clear cost more than the copies.
+//! system has to clear cost more than the copies. Where few points change place, only those move.
 
 use std::any::Any;
 
 /// An order that is applied to one field after the other.
 pub(super) struct Gather<'a> {
     order: &'a [usize],
-    ascending: bool,
     /// A `Vec<T>`: the memory that the last field left; the next one is mostly of its type.
     spare: Box<dyn Any>,
 }
 
 impl<'a> Gather<'a> {
     pub fn new(order: &'a [usize]) -> Self {
-        let ascending = order.windows(2).all(|pair| pair[0] < pair[1]);
-        Gather { order, ascending, spare: Box::new(()) }
+        Gather { order, spare: Box::new(()) }
     }
 
     /// Keeps `values[order[0]], values[order[1]], ...`; a field without values stays so.
     pub fn apply<T: Copy + 'static>(&mut self, values: &mut Vec<T>) {
         if values.is_empty() {
             return;
-        }
-        if self.ascending {
-            return keep(values, self.order);
         }
         if !self.spare.is::<Vec<T>>() {
             self.spare = Box::new(Vec::<T>::with_capacity(with_slack(self.order.len())));
@@ -41,13 +36,46 @@ pub(super) fn with_slack(points: usize) -> usize {
     points + points / 64
 }
 
-/// Keeps the values at the places `stay`, which ascend.
-fn keep<T: Copy>(values: &mut Vec<T>, stay: &[usize]) {
-    let moved = stay.iter().enumerate().skip_while(|(to, from)| to == *from);
-    for (to, &from) in moved {
-        values[to] = values[from];
+/// Values that change place, one after the other.
+pub(super) struct Moves {
+    from_to: Vec<(usize, usize)>,
+    /// How many values there are in the end.
+    left: usize,
+}
+
+impl Moves {
+    /// Of `all` values those at the places `gone` (ascending, below `own`) make room for the ones from
+    /// `own` on, in order. What is left over of these closes up; where they are too few, the last of
+    /// the others take the places.
+    pub fn new(gone: &[usize], own: usize, all: usize) -> Self {
+        let filled = gone.len().min(all - own);
+        let mut from_to: Vec<_> = (own..own + filled).zip(gone.iter().copied()).collect();
+        from_to.extend((own + filled..all).zip(own..));
+        let (mut gaps, mut last) = (&gone[filled..], own);
+        while let [first, rest @ ..] = gaps {
+            last -= 1;
+            gaps = if let [others @ .., end] = gaps
+                && *end == last
+            {
+                others
+            } else {
+                from_to.push((last, *first));
+                rest
+            };
+        }
+        Moves { from_to, left: all - gone.len() }
     }
-    values.truncate(stay.len());
+
+    /// A field without values stays so.
+    pub fn apply<T: Copy>(&self, values: &mut Vec<T>) {
+        if values.is_empty() {
+            return;
+        }
+        for &(from, to) in &self.from_to {
+            values[to] = values[from];
+        }
+        values.truncate(self.left);
+    }
 }
 
 #[cfg(test)]
@@ -72,6 +100,31 @@ mod tests {
             }
             let counts = [numbers.len(), first.len(), second.len(), pairs.len()];
             assert_eq!(counts, [order.len(); 4]);
+        }
+    }
+
+    #[test]
+    fn gaps_are_filled_and_the_others_stay() {
+        let (own, new) = (6, 100);
+        for gone in [vec![], vec![2], vec![0, 5], vec![3, 4, 5], vec![1, 3, 5], (0..6).collect()] {
+            for arrived in 0..8 {
+                let mut values: Vec<usize> = (0..own).chain(new..new + arrived).collect();
+                let mut none: Vec<u8> = Vec::new();
+                let moves = Moves::new(&gone, own, own + arrived);
+                moves.apply(&mut values);
+                moves.apply(&mut none);
+                assert!(none.is_empty());
+                assert_eq!(values.len(), own + arrived - gone.len());
+                for (place, &value) in values.iter().enumerate() {
+                    let stayed = value == place || value >= new || gone.contains(&place);
+                    assert!(stayed, "{gone:?}, {arrived} arrived: {values:?}");
+                }
+                let mut sorted = values.clone();
+                sorted.sort_unstable();
+                let kept = (0..own).filter(|p| !gone.contains(p));
+                let expected: Vec<usize> = kept.chain(new..new + arrived).collect();
+                assert_eq!(sorted, expected, "{gone:?}, {arrived} arrived");
+            }
         }
     }
 }

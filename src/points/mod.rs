@@ -16,7 +16,7 @@ mod seed_cells;
 pub mod share;
 pub mod sort;
 
-use gather::Gather;
+use gather::{Gather, Moves};
 use nalgebra::Matrix3;
 
 use crate::deck::model::Basis;
@@ -87,6 +87,13 @@ macro_rules! point_fields {
                 gather.apply(&mut self.id);
                 gather.apply(&mut self.body);
                 $( gather.apply(&mut self.$name); )*
+            }
+
+            /// Moves points to other places, and drops those beyond the last.
+            fn rearrange(&mut self, moves: &Moves) {
+                moves.apply(&mut self.id);
+                moves.apply(&mut self.body);
+                $( moves.apply(&mut self.$name); )*
             }
 
             /// Makes room for this many more points: by little where there is none, as an array

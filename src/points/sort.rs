@@ -2,52 +2,56 @@
 //! every sum over points runs in the same order on a repeat.
 
 use super::Points;
+use super::gather::Moves;
 
 /// Points are left as they are while at most one in this many comes before its predecessor: a few
 /// strays cost less than moving every point's state.
 const STRAYS: usize = 50;
 
-/// Drops the points that are not in `kept` (ascending; `None`: none) and sorts the others by (cell,
-/// id), unless nearly all are in that order already. `cells[p]` is the cell of point p. Points
-/// that are out of order in more than a few places end in the one order that cell and id give.
-pub fn sort_by_cell<const D: usize>(
+/// Puts the points from place `own` on where others are `gone` (ascending, below `own`), closes the
+/// places that are left with the last points, and sorts as [`sort_by_cell`] does. What leaves and
+/// what arrives in a step lies along the same borders: the order hardly suffers, and all the others
+/// stay where they are.
+pub fn take_places<const D: usize>(
     points: &mut Points<D>,
-    cells: &[usize],
-    kept: Option<Vec<usize>>,
+    cells: &mut Vec<usize>,
+    gone: &[usize],
+    own: usize,
 ) {
+    let moves = Moves::new(gone, own, points.len());
+    points.rearrange(&moves);
+    moves.apply(cells);
+    sort_by_cell(points, cells);
+}
+
+/// Sorts the points by (cell, id), unless nearly all are in that order already. `cells[p]` is the
+/// cell of point p. Points that are out of order in more than a few places end in the one order
+/// that cell and id give.
+pub fn sort_by_cell<const D: usize>(points: &mut Points<D>, cells: &[usize]) {
     let key = |p: usize| (cells[p], points.id[p]);
-    let strays = match &kept {
-        Some(kept) => kept.windows(2).filter(|pair| key(pair[0]) > key(pair[1])).count(),
-        None => (1..cells.len()).filter(|&p| key(p - 1) > key(p)).count(),
-    };
-    let count = kept.as_ref().map_or(cells.len(), Vec::len);
-    if strays * STRAYS > count {
-        let kept = kept.unwrap_or_else(|| (0..count).collect());
-        let order = order_of(cells, &points.id, kept);
-        points.select(&order);
-    } else if let Some(kept) = kept {
-        points.select(&kept);
+    let strays = (1..cells.len()).filter(|&p| key(p - 1) > key(p)).count();
+    if strays * STRAYS > cells.len() {
+        points.select(&order_of(cells, &points.id));
     }
 }
 
-/// `kept` in ascending (cell, id): by counting where the cells lie close together, by comparing
+/// Places in ascending (cell, id): by counting where the cells lie close together, by comparing
 /// where they do not.
-fn order_of(cells: &[usize], ids: &[u64], mut kept: Vec<usize>) -> Vec<usize> {
-    let of_kept = || kept.iter().map(|&p| cells[p]);
-    let (Some(low), Some(high)) = (of_kept().min(), of_kept().max()) else { return kept };
-    if (high - low) / 16 > kept.len() {
-        kept.sort_unstable_by_key(|&p| (cells[p], ids[p]));
-        return kept;
+fn order_of(cells: &[usize], ids: &[u64]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..cells.len()).collect();
+    let (Some(&low), Some(&high)) = (cells.iter().min(), cells.iter().max()) else { return order };
+    if (high - low) / 16 > cells.len() {
+        order.sort_unstable_by_key(|&p| (cells[p], ids[p]));
+        return order;
     }
     let mut ends = vec![0; high - low + 1];
-    of_kept().for_each(|cell| ends[cell - low] += 1);
+    cells.iter().for_each(|&cell| ends[cell - low] += 1);
     let mut before = 0;
     for end in &mut ends {
         before += std::mem::replace(end, before);
     }
-    let mut order = vec![0; kept.len()];
-    for p in kept {
-        let place = &mut ends[cells[p] - low];
+    for (p, &cell) in cells.iter().enumerate() {
+        let place = &mut ends[cell - low];
         order[*place] = p;
         *place += 1;
     }
@@ -76,7 +80,7 @@ mod tests {
         let sorted = |order: &[usize]| {
             let mut points = points(order.iter().copied());
             let cells: Vec<usize> = order.iter().map(|k| 100 - k / 2).collect();
-            sort_by_cell(&mut points, &cells, None);
+            sort_by_cell(&mut points, &cells);
             assert!(points.id.iter().zip(&points.position).all(|(&id, x)| x[0] == id as f64));
             points.id
         };
@@ -85,13 +89,18 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_kept_is_dropped_sorted_or_not() {
-        for cells in [[1, 2, 3, 4, 5], [5, 4, 3, 2, 1]] {
-            let mut points = points(0..5);
-            sort_by_cell(&mut points, &cells, Some(vec![0, 2, 3]));
-            assert_eq!(points.id, if cells[0] == 1 { [0, 2, 3] } else { [3, 2, 0] });
-            assert_eq!(points.mass.len(), 3);
-        }
+    fn arrivals_take_places() {
+        let count = 10 * STRAYS;
+        let mut points = points(0..count + 1);
+        let mut cells: Vec<usize> = (0..count).chain([4]).collect();
+        take_places(&mut points, &mut cells, &[1, 7], count);
+        assert_eq!(
+            (points.len(), points.mass.len(), cells.len()),
+            (count - 1, count - 1, count - 1)
+        );
+        assert_eq!(points.id[..3], [0, count as u64, 2]);
+        assert_eq!(points.id[7], count as u64 - 1, "the last one closes the gap");
+        assert_eq!((cells[1], cells[7]), (4, count - 1));
     }
 
     #[test]
@@ -99,15 +108,10 @@ mod tests {
         let ids: Vec<u64> = (0..300).map(|k| k * 7919 % 307).collect();
         let cells: Vec<usize> = (0..300).map(|k| 40 + k * k % 83).collect();
         let far: Vec<usize> = cells.iter().map(|cell| cell << 20).collect();
-        let all: Vec<usize> = (0..300).collect();
-        let order = order_of(&cells, &ids, all.clone());
+        let order = order_of(&cells, &ids);
         assert!(order.windows(2).all(|p| (cells[p[0]], ids[p[0]]) < (cells[p[1]], ids[p[1]])));
-        assert_eq!(order, order_of(&far, &ids, all));
-        let odd = |order: &[usize]| -> Vec<usize> {
-            order.iter().copied().filter(|p| p % 2 == 1).collect()
-        };
-        assert_eq!(odd(&order), order_of(&cells, &ids, (1..300).step_by(2).collect()));
-        assert!(order_of(&[], &[], Vec::new()).is_empty());
+        assert_eq!(order, order_of(&far, &ids));
+        assert!(order_of(&[], &[]).is_empty());
     }
 
     #[test]
@@ -119,7 +123,7 @@ mod tests {
             for k in 0..strays {
                 cells.swap(7 * k, 7 * k + 1);
             }
-            sort_by_cell(&mut points, &cells, None);
+            sort_by_cell(&mut points, &cells);
             assert_eq!(points.id.is_sorted(), kept, "{strays} strays");
         }
     }
