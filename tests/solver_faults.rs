@@ -226,6 +226,24 @@ fn files_that_fail_at_the_start_and_at_the_end() {
     }
 }
 
+/// PETSc opens a file on one rank only, and the others go on to an exchange with it.
+#[test]
+fn files_that_fail_in_a_step() {
+    for words in ["-qs_snes_monitor :link", "-qs_ksp_converged_reason :link"] {
+        for ranks in [1, 2, 3] {
+            let folder = tempfile::tempdir().unwrap();
+            std::os::unix::fs::symlink("nowhere/x", folder.path().join("link")).unwrap();
+            let outcome = with(words).ranks(ranks).attempt_in(folder);
+            let text = outcome.said();
+            let expected = "Cannot open PetscViewer file: link";
+            let first = text.lines().next().unwrap_or_default();
+            assert!(first.contains(expected), "{words} on {ranks} ranks: {text}");
+            assert_eq!(text.matches(expected).count(), 1, "{words} on {ranks} ranks: {text}");
+            assert_eq!(outcome.code, 4, "{words} on {ranks} ranks");
+        }
+    }
+}
+
 /// Round-off is not healed by smaller steps.
 #[test]
 fn a_residual_at_round_off_is_told_to_raise_the_tolerance() {

@@ -18,7 +18,7 @@ use crate::output::summary::Status;
 use crate::output::{ResultsDirectory, RunLock};
 use crate::parallel::{World, signals};
 use crate::petsc::log::Stages;
-use crate::petsc::session::{self, Session};
+use crate::petsc::{self, Session};
 use crate::petsc::{files, known};
 
 use super::checkpointing::{self, Checkpointer};
@@ -36,7 +36,7 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
         eprintln!("error: MPI could not be started");
         return Error::Environment(String::new()).exit_code();
     };
-    session::install_panic_hook();
+    petsc::install_panic_hook();
     let world = World::new(universe.world().duplicate());
     let outcome = cli::parse(words).and_then(|arguments| match &arguments.print {
         Some(text) => {
@@ -101,7 +101,7 @@ fn versions() -> BTreeMap<String, String> {
     let mpi = mpi.split(',').next().unwrap_or_default().trim().to_string();
     BTreeMap::from([
         ("mpm-par".to_string(), env!("CARGO_PKG_VERSION").to_string()),
-        ("PETSc".to_string(), session::version()),
+        ("PETSc".to_string(), petsc::version()),
         ("MPI".to_string(), mpi),
         ("HDF5".to_string(), {
             let (major, minor, patch) = hdf5::library_version();

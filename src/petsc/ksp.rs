@@ -6,6 +6,7 @@ use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
+use super::abort::unless_shared;
 use super::check::{agree, bool_of, c_text, petsc, require_running, running, text_of};
 use super::vector::index;
 use super::{Matrix, Vector, sys};
@@ -72,7 +73,7 @@ impl Ksp {
     /// Reads the options under the prefix. Values set by methods before this can be overridden
     /// by the user, values set after it cannot.
     pub fn set_from_options(&mut self) -> Result<()> {
-        petsc!(KSPSetFromOptions(self.raw))
+        petsc!(KSPSetFromOptions(self.raw)).map_err(|error| unless_shared(&self.comm, error))
     }
 
     /// Relative and absolute residual, iterations; `None` leaves a value as it is.
@@ -97,7 +98,7 @@ impl Ksp {
     /// the old preconditioner is to serve on. Another matrix may have another size and pattern.
     pub fn set_operators(&mut self, matrix: &Matrix) -> Result<()> {
         if self.matrix != 0 && self.matrix != matrix.id() {
-            forget(self.raw)?;
+            forget(self.raw, &self.comm)?;
         }
         self.matrix = matrix.id();
         petsc!(KSPSetOperators(self.raw, matrix.raw(), matrix.raw()))
@@ -129,7 +130,8 @@ impl Ksp {
     /// Solves A x = b. Not converging is an outcome, the same on all ranks, not an error: see
     /// [`KspOutcome::require`].
     pub fn solve(&mut self, b: &Vector, x: &mut Vector) -> Result<KspOutcome> {
-        petsc!(KSPSolve(self.raw, b.raw(), x.raw()))?;
+        petsc!(KSPSolve(self.raw, b.raw(), x.raw()))
+            .map_err(|error| unless_shared(&self.comm, error))?;
         outcome(self.raw, &self.comm).map(|(outcome, _)| outcome)
     }
 
@@ -150,7 +152,7 @@ impl Drop for Ksp {
 
 /// Drops all that belongs to the old matrix, so that one of another size can follow. A reset is
 /// not enough: GAMG would keep its levels. The preconditioner is made anew from its options.
-pub(super) fn forget(ksp: sys::KSP) -> Result<()> {
+pub(super) fn forget(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
     petsc!(KSPReset(ksp))?;
     let (mut pc, mut kind) = (null_mut(), null());
     petsc!(KSPGetPC(ksp, &mut pc))?;
@@ -161,7 +163,7 @@ pub(super) fn forget(ksp: sys::KSP) -> Result<()> {
     let kind = c_text(&text_of(kind))?;
     petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
     petsc!(PCSetType(pc, kind.as_ptr()))?;
-    petsc!(PCSetFromOptions(pc))
+    petsc!(PCSetFromOptions(pc)).map_err(|error| unless_shared(comm, error))
 }
 
 /// Options of a direct solver whose answer repeats bit by bit on any number of ranks: the

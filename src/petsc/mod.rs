@@ -4,7 +4,8 @@
 //! |---|---|
 //! | `sys.rs` | raw bindings, generated |
 //! | `check.rs` | return codes to errors; one rank's error becomes every rank's |
-//! | `session.rs` | start and end of PETSc, order of the options, abort |
+//! | `session.rs` | start and end of PETSc, order of the options |
+//! | `abort.rs` | the end of all ranks at once |
 //! | `options.rs` | defaults that the user can override, options nobody read |
 //! | `files.rs` | files that options name, tried before PETSc does |
 //! | `rehearsal.rs` | [`Rehearsal`]: the user's options tried on a small system |
@@ -25,6 +26,7 @@
 //! Every constructor and every method that talks to a communicator is collective. Objects that
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
+mod abort;
 mod block_product;
 mod blocks;
 mod check;
@@ -45,6 +47,7 @@ mod stored;
 pub mod sys;
 pub mod vector;
 
+pub use abort::install_panic_hook;
 pub use block_product::BlockProduct;
 pub use blocks::Blocks;
 pub use check::agree;
@@ -54,7 +57,7 @@ pub use hierarchy::{CoarsestRows, Hierarchy, Smoothed};
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
 pub use rehearsal::Rehearsal;
-pub use session::{Session, abort_all, version};
+pub use session::{Session, version};
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
 pub use stored::Stored;
 pub use vector::Vector;

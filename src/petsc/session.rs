@@ -8,13 +8,13 @@
 //! ([`super::options::set_default`]).
 
 use std::ffi::{CString, c_char, c_int};
-use std::io::Write as _;
 use std::marker::PhantomData;
 use std::ptr::null;
 
 use mpi::environment::Universe;
 use mpi::traits::{Communicator, Root};
 
+use super::abort::{end_all, install_panic_hook};
 use super::check::{agree, check, essence, petsc, remember};
 use super::{files, options, sys};
 use crate::error::{Error, Result};
@@ -31,7 +31,7 @@ impl<'u> Session<'u> {
     /// lists of rank 0 count on all ranks.
     ///
     /// Errors: PETSc was started before; a file with options cannot be read. Where PETSc's own
-    /// start fails, all ranks end ([`abort_all`]).
+    /// start fails, all ranks end ([`end_all`]).
     pub fn start(
         universe: &'u Universe,
         table: &[(String, String)],
@@ -69,7 +69,8 @@ impl<'u> Session<'u> {
         // SAFETY: a null-terminated argument list that lives for ever; the help texts may be null.
         let code = unsafe { sys::PetscInitialize(count, list, null(), null()) };
         if let Err(error) = check(code, "PetscInitialize") {
-            end_all(rank, &format!("PETSc could not be started: {}", essence(&error)));
+            let text = format!("PETSc could not be started: {}", essence(&error));
+            end_all(rank, &Error::Environment(text));
         }
         petsc!(PetscPushErrorHandler(Some(remember), std::ptr::null_mut()))?;
         // Signals stay the program's own: PETSc would turn each into an abort.
@@ -103,21 +104,10 @@ impl Drop for Session<'_> {
             sys::PetscFinalize()
         };
         if let Err(error) = check(code, "PetscFinalize") {
-            end_all(rank, &format!("PETSc could not be ended in order: {}", essence(&error)));
+            let text = format!("PETSc could not be ended in order: {}", essence(&error));
+            end_all(rank, &Error::Environment(text));
         }
     }
-}
-
-/// For a failure inside PETSc that other ranks may not see: they would wait for ever.
-fn end_all(rank: i32, message: &str) -> ! {
-    if rank != 0 {
-        // Where all have failed, the first speaks for all.
-        std::thread::sleep(std::time::Duration::from_secs(2));
-    }
-    let _ = writeln!(std::io::stderr(), "error: {message}");
-    // Time for the line to get out: mpirun has much to say of an abort.
-    std::thread::sleep(std::time::Duration::from_millis(300));
-    abort_all(Error::Environment(String::new()).exit_code())
 }
 
 /// The full argument list, program name first.
@@ -170,33 +160,6 @@ fn broadcast(universe: &Universe, list: Vec<String>) -> Vec<String> {
     bytes.resize(length, 0);
     root.broadcast_into(&mut bytes[..]);
     String::from_utf8_lossy(&bytes).split('\0').map(str::to_owned).collect()
-}
-
-/// A panic on one rank would leave the others waiting in MPI for ever: abort all instead.
-pub fn install_panic_hook() {
-    static ONCE: std::sync::Once = std::sync::Once::new();
-    ONCE.call_once(|| {
-        let previous = std::panic::take_hook();
-        std::panic::set_hook(Box::new(move |info| {
-            previous(info);
-            abort_all(101);
-        }));
-    });
-}
-
-/// Ends every rank at once with this exit code: for failures that the other ranks cannot learn of
-/// in an orderly way. Without a running MPI, ends this process.
-pub fn abort_all(code: i32) -> ! {
-    let (mut started, mut ended) = (0, 0);
-    // SAFETY: the two questions may be asked at any time; the abort only while MPI runs.
-    unsafe {
-        mpi::ffi::MPI_Initialized(&mut started);
-        mpi::ffi::MPI_Finalized(&mut ended);
-        if started != 0 && ended == 0 {
-            mpi::ffi::MPI_Abort(mpi::ffi::RSMPI_COMM_WORLD, code);
-        }
-    }
-    std::process::exit(code)
 }
 
 /// Version of the PETSc library in use, for example "3.18.5".

@@ -11,6 +11,7 @@ use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
+use super::abort::unless_shared;
 use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
 use super::hierarchy::{self, Hierarchy, Installed};
@@ -160,7 +161,7 @@ impl Snes {
 
     /// Reads the options under the prefix, those of the linear solver included.
     pub fn set_from_options(&mut self) -> Result<()> {
-        petsc!(SNESSetFromOptions(self.raw))?;
+        petsc!(SNESSetFromOptions(self.raw)).map_err(|error| unless_shared(&self.comm, error))?;
         self.forcing = forcing::chosen(self.raw, &self.prefix)?;
         Ok(())
     }
@@ -224,7 +225,7 @@ impl Snes {
         if context.apart {
             self.forget()?;
         } else {
-            solved?;
+            solved.map_err(|error| unless_shared(&self.comm, error))?;
             petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
             petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
         }
@@ -254,7 +255,7 @@ impl Snes {
         let mut inner = null_mut();
         petsc!(SNESReset(self.raw))?;
         petsc!(SNESGetKSP(self.raw, &mut inner))?;
-        ksp::forget(inner)
+        ksp::forget(inner, &self.comm)
     }
 }
 
@@ -307,7 +308,8 @@ impl<P: NewtonProblem> Context<'_, P> {
             let made = self.problem.hierarchy(self.matrix);
             let made = agree(self.comm, made)?;
             let install = |made| Installed::new(inner, self.comm, state, made);
-            self.levels = made.map(install).transpose()?;
+            let installed = made.map(install).transpose();
+            self.levels = installed.map_err(|error| unless_shared(self.comm, error))?;
         }
         let Some(levels) = &mut self.levels else { return Ok(()) };
         let (problem, matrix) = (&mut *self.problem, &mut *self.matrix);

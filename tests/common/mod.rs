@@ -59,7 +59,7 @@ pub fn on_ranks_with(
     if std::env::var(INSIDE).as_deref() == Ok(name) {
         let (universe, _) = mpi::initialize_with_threading(mpi::Threading::Funneled)
             .expect("MPI was not started before");
-        mpm_par::petsc::session::install_panic_hook();
+        mpm_par::petsc::install_panic_hook();
         body(&universe);
         return;
     }
