@@ -11,7 +11,7 @@
 //! | mass of the nodes | `grid_mass.rs` | Ghost eq. 7, 10, 15, 24 |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | deck to points on their ranks | `setup.rs` | |
-//! | does it fit into the machine? | `room.rs` | |
+//! | does it fit into the machine? | `room.rs`, `free_memory.rs` | |
 //! | formulas without a value, conditions on nothing? | `first_state.rs` | |
 //! | rigid motions of every piece held? | `support.rs`, `pieces.rs` | |
 //! | locate, map and number: the grid side of a step | `discretise.rs` (`grid/locate.rs`) | Ghost Figure 1 a-c |
@@ -41,6 +41,7 @@ mod explicit_nodes;
 mod explicit_step;
 pub mod extremes;
 pub mod first_state;
+mod free_memory;
 pub mod grid_mass;
 pub mod implicit_dynamic;
 pub mod ledger;

@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::output::report::bytes;
 use crate::parallel::World;
 
+use super::free_memory::FreeMemory;
 use super::plan;
 
 /// Places per axis at which a shape is sampled.
@@ -26,15 +27,17 @@ pub fn require<const D: usize>(world: &World, deck: &Deck) -> Result<()> {
     let shared = plan::memory::<D>(deck.method.basis, size.points, size.nodes);
     let own = shared / world.size() as f64 + mesh;
     let on_node = own * world.comm().split_shared(world.rank() as i32).size() as f64;
-    let read = |path: &str| std::fs::read_to_string(path).unwrap_or_default();
-    let free = kilobytes(&read("/proc/meminfo"), "MemAvailable:");
-    let limit = address_space(&read("/proc/self/limits"))
-        .map(|limit| limit - kilobytes(&read("/proc/self/status"), "VmSize:").unwrap_or(0.0));
-    let short = match (free, limit) {
-        (Some(free), _) if on_node > free => {
+    let free = FreeMemory::read();
+    let short = match free {
+        FreeMemory { machine: Some(free), .. } if on_node > free => {
             Some(format!("{} on this machine, which has {} available", text(on_node), text(free)))
         }
-        (_, Some(limit)) if own > limit => {
+        FreeMemory { group: Some(free), .. } if on_node > free => Some(format!(
+            "{} on this machine, where the job may take {} more (memory limit of its control group)",
+            text(on_node),
+            text(free)
+        )),
+        FreeMemory { process: Some(limit), .. } if own > limit => {
             Some(format!("{} on a rank, which may take {} (ulimit -v)", text(own), text(limit)))
         }
         _ => None,
@@ -167,18 +170,6 @@ fn filled((low, high): &Bounds, contains: impl Fn(&[f64]) -> bool) -> f64 {
     lengths.iter().product::<f64>() * (inside.count() as f64 / all as f64)
 }
 
-/// Bytes of a line `NAME 123 kB`.
-fn kilobytes(table: &str, name: &str) -> Option<f64> {
-    let line = table.lines().find(|line| line.starts_with(name))?;
-    line.split_whitespace().nth(1)?.parse::<f64>().ok().map(|size| 1024.0 * size)
-}
-
-/// Bytes of the soft limit on the address space; `None` if there is none.
-fn address_space(limits: &str) -> Option<f64> {
-    let line = limits.lines().find(|line| line.starts_with("Max address space"))?;
-    line.split_whitespace().nth(3)?.parse().ok()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -205,14 +196,5 @@ mod tests {
         assert!((size(&[cut]).points / expected - 0.5).abs() < 0.02);
         let open = size(&["body.0.shape={ where = \"x < 5.5\" }"]);
         assert!((open.points - 880.0).abs() < 20.0, "{}", open.points);
-    }
-
-    #[test]
-    fn tables_of_the_system_are_read() {
-        assert_eq!(kilobytes("A: 1 kB\nMemAvailable:    2 kB\n", "MemAvailable:"), Some(2048.0));
-        assert_eq!(kilobytes("", "MemAvailable:"), None);
-        let limits = |soft: &str| format!("Max address space         {soft}   unlimited  bytes\n");
-        assert_eq!(address_space(&limits("3072")), Some(3072.0));
-        assert_eq!(address_space(&limits("unlimited")), None);
     }
 }
