@@ -34,10 +34,14 @@ fn main() {
         pairs("2D gimp, 2 x 2 points, 20 steps", "scaling", &["grid.h=0.02", "analysis.steps=20"]);
         let many = ["grid.h=0.04", "body.0.points_per_cell=[4,4]", "analysis.steps=40"];
         pairs("2D gimp, 4 x 4 points, 40 steps", "scaling", &many);
-        let mut block = block_3d(30);
-        block.push("analysis.steps=4".into());
-        let block: Vec<&str> = block.iter().map(String::as_str).collect();
-        pairs("3D gimp, 4 steps", "scaling", &block);
+        pairs("3D gimp, 4 steps", "scaling", &block_3d(30, &["analysis.steps=4"]));
+        let dense = [
+            "analysis.steps=12",
+            "body.0.points_per_cell=[3,3,3]",
+            "method.basis=\"mpm\"",
+            "method.domain_update=",
+        ];
+        pairs("3D mpm, 3 x 3 x 3 points, 12 steps", "scaling", &block_3d(20, &dense));
     }
     if wanted("mesh") {
         for basis in ["mpm", "cpdi2"] {
@@ -147,10 +151,10 @@ const MESH: [&str; 7] = [
     "petsc.qs_pc_type=\"mg\"",
 ];
 
-/// The block of `inputs/scaling.toml` as a cube of `cells` a side.
-fn block_3d(cells: usize) -> Vec<String> {
+/// The block of `inputs/scaling.toml` as a cube of `cells` a side, and what `more` changes.
+fn block_3d(cells: usize, more: &[&str]) -> Vec<String> {
     let h = 1.0 / cells as f64;
-    [
+    let block = [
         format!("grid.h={h}"),
         "grid.origin=[0.0,0.0,0.0]".into(),
         format!("grid.size=[{a},{a},{a}]", a = 1.0 + 2.0 * h),
@@ -161,13 +165,15 @@ fn block_3d(cells: usize) -> Vec<String> {
         "boundary.0.fix=[\"z\",\"y\"]".into(),
         "load.0.gravity=[0,0,-10]".into(),
         "analysis.steps=2".into(),
-    ]
-    .into()
+    ];
+    block.into_iter().chain(more.iter().map(|set| (*set).to_string())).collect()
 }
 
 /// Two ranks beside one and beside two independent copies, in turn. The copies share nothing but
 /// the machine: twice the time of one alone over theirs is the most that two ranks can gain.
-fn pairs(name: &str, deck: &str, sets: &[&str]) {
+fn pairs<S: AsRef<str>>(name: &str, deck: &str, sets: &[S]) {
+    let sets: Vec<&str> = sets.iter().map(AsRef::as_ref).collect();
+    let sets = &sets[..];
     let deck = input(&format!("{deck}.toml"));
     let (mut runs, mut copies) = ([Vec::new(), Vec::new()], Vec::new());
     for _ in 0..REPEATS {
@@ -241,9 +247,7 @@ fn memory() {
     };
     fit("2D gimp", sizes(&plane(24, 2)), sizes(&plane(24, 4)), sizes(&plane(48, 2)));
     let solid = |n: usize, per: usize| {
-        let mut sets = block_3d(n);
-        sets.push(format!("body.0.points_per_cell=[{per},{per},{per}]"));
-        sets
+        block_3d(n, &[&format!("body.0.points_per_cell=[{per},{per},{per}]")])
     };
     fit("3D gimp", sizes(&solid(14, 2)), sizes(&solid(14, 3)), sizes(&solid(22, 2)));
 }
