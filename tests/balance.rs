@@ -76,6 +76,27 @@ fn a_collapse_levels_itself_and_ends_as_without_it() {
     assert!(error < 1e-8, "{error:e}");
 }
 
+/// Of two ranks one holds 3/4 of the points; of three the first holds all of them.
+#[test]
+fn fewer_ranks_level_themselves_too() {
+    let alone = small().ranks(1).results();
+    for (ranks, size, start) in
+        [(2, "grid.size=[6.0, 2.4]", 1.5), (3, "grid.size=[12.0, 2.4]", 3.0)]
+    {
+        let run = small().ranks(ranks).set(size);
+        let (with, without) = (run.results(), run.set(OFF).results());
+        let imbalance = with.history("imbalance");
+        assert!((imbalance[0] - start).abs() < 0.03, "{ranks} ranks start at {}", imbalance[0]);
+        let later = imbalance[1..].iter().copied().fold(0.0, f64::max);
+        assert!(later < 1.1, "{ranks} ranks: {later}");
+        assert!(without.number("imbalance") > 0.9 * start, "it does not level by itself");
+        for (name, other) in [("without levelling", &without), ("on one rank", &alone)] {
+            let error = difference(&with, other);
+            assert!(error < 1e-8, "{ranks} ranks and {name}: {error:e}");
+        }
+    }
+}
+
 /// Ghost faces, halos and the corners of CPDI domains are right in the first step after the
 /// points have moved: Newton's residuals and the end are those of the run that stays unequal.
 #[test]
