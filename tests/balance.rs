@@ -128,11 +128,13 @@ fn implicit_steps_do_not_notice_a_new_partition() {
 #[test]
 #[ignore = "half an hour on two cores: make validate"]
 fn half_a_million_points_level_themselves() {
-    let with = slump(&[]).results();
+    // Twenty minutes without levelling, on two cores that do nothing else.
+    let run = slump(&[]).limit(2 * 3600);
+    let with = run.results();
     assert_eq!(with.count("points"), 500_000);
     let steps = with.count("steps_completed");
     assert_levelled(&with, steps);
-    let without = slump(&[]).set(OFF).results();
+    let without = run.set(OFF).results();
     let error = difference(&with, &without);
     println!("{steps} steps, end {:.3}, difference {error:e}", with.number("imbalance"));
     assert!(error < 1e-8, "{error:e}");

@@ -51,6 +51,7 @@ pub struct Run {
     ranks: usize,
     words: Vec<String>,
     env: Vec<(String, String)>,
+    limit: u32,
 }
 
 #[derive(Clone)]
@@ -75,7 +76,13 @@ impl Run {
     }
 
     pub fn file(path: impl Into<PathBuf>) -> Self {
-        Run { deck: Deck::File(path.into()), ranks: 1, words: Vec::new(), env: Vec::new() }
+        Run {
+            deck: Deck::File(path.into()),
+            ranks: 1,
+            words: Vec::new(),
+            env: Vec::new(),
+            limit: TIME_LIMIT,
+        }
     }
 
     /// A deck given as text.
@@ -94,6 +101,12 @@ impl Run {
 
     pub fn ranks(mut self, ranks: usize) -> Self {
         self.ranks = ranks;
+        self
+    }
+
+    /// For a job that may take longer than others, s.
+    pub fn limit(mut self, seconds: u32) -> Self {
+        self.limit = seconds;
         self
     }
 
@@ -146,7 +159,7 @@ impl Run {
 
     fn start(&self, folder: &Path, arguments: &[String]) -> Output {
         let _cores = Cores::take(self.ranks);
-        let mut job = job(self.ranks, TIME_LIMIT);
+        let mut job = job(self.ranks, self.limit);
         job.arg(env!("CARGO_BIN_EXE_mpm-par")).args(arguments).current_dir(folder);
         // After a run that failed mpirun waits so long for ranks that are gone already, s.
         job.env("OMPI_MCA_odls_base_sigkill_timeout", "0");
