@@ -126,9 +126,9 @@ fn implicit_steps_do_not_notice_a_new_partition() {
 
 /// The deck as it is: 500 000 points.
 #[test]
-#[ignore = "half an hour on two cores: make validate"]
+#[ignore = "ten minutes or more on two cores: make validate"]
 fn half_a_million_points_level_themselves() {
-    // Twenty minutes without levelling, on two cores that do nothing else.
+    // Without levelling one run may pass the limit of the others on a busy machine.
     let run = slump(&[]).limit(2 * 3600);
     let with = run.results();
     assert_eq!(with.count("points"), 500_000);
