@@ -249,8 +249,9 @@ impl<'a, const D: usize> Nodes<'a, D> {
     }
 
     /// Σ_l (1 - S+ S)^l v for l below the order: the series of XPIC(m) for the inverse of the
-    /// consistent mass, with S+ v_p = M^-1 Σ m S^T v_p by the lumped mass. Local values in, owned
-    /// ones and ghosts; so returned. Collective.
+    /// consistent mass, with S+ v_p = M^-1 Σ m S^T v_p by the lumped mass. What boundaries hold is
+    /// in the first term alone: S+ gives it back as it is. Local values in, owned ones and ghosts;
+    /// so returned. Collective.
     fn sharpen(
         &mut self,
         step: StepPoints<'_, D>,
@@ -262,9 +263,8 @@ impl<'a, const D: usize> Nodes<'a, D> {
         for _ in 1..order {
             let back = mapping::at_points(step, &term);
             let momentum = self.momentum(step, &back);
-            let mapped = timed(&mut self.seconds, || {
-                self.inverse.solve_to_ghosts(&momentum, &self.at_rest, None)
-            })?;
+            let mapped =
+                timed(&mut self.seconds, || self.inverse.solve_to_ghosts(&momentum, &term, None))?;
             for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
                 *t -= m;
                 *s += *t;
