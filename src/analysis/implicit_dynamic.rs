@@ -257,7 +257,7 @@ fn solve_step<const D: usize>(
         Ok(update::energies(points, &model.materials))
     })?;
 
-    let sums = StepSums { energies, ghost, work };
+    let sums = StepSums { energies, ghost, work, driven: 0.0 };
     let reaction = at_held(&conditions, &supplied);
     let row = HistoryRow {
         step: number,

@@ -10,6 +10,7 @@ mod program;
 mod blocks;
 mod conditioning;
 mod conservation;
+mod driven;
 mod faults;
 mod figure_14;
 mod ghosts;

@@ -1,0 +1,68 @@
+//! Boundaries that move from the first explicit step on.
+
+use super::blocks::blocks;
+use crate::common::run::Run;
+
+/// A bar of 4 m held on the left and pulled at its right end; sound crosses a cell in 0.09 s.
+fn pulled(duration: f64, metres: f64) -> Run {
+    blocks(&["shape = { box = { min = [0, 2], max = [4, 4] } }"])
+        .set(format!("analysis.duration={duration:?}"))
+        .set("ghost={ mass_factor = 0.25 }")
+        .set(format!(
+            "boundary=[{{ where = {{ side = \"left\" }}, fix = [\"x\", \"y\"] }}, \
+             {{ where = {{ box = {{ min = [4, 0], max = [8, 8] }} }}, \
+             displacement = {{ x = {metres:?} }} }}]"
+        ))
+}
+
+/// The strain of the first step is there before the reaction that does its work: no fault of the
+/// time step. Over the whole pull work and energy agree.
+#[test]
+fn a_boundary_that_starts_to_move_makes_no_energy() {
+    for (update, velocity, mass, ranks) in [
+        ("musl", "\"flip\"", "consistent", 1),
+        ("usl", "\"flip\"", "lumped", 2),
+        ("usf", "0.5", "consistent", 1),
+        ("musl", "\"pic\"", "lumped", 1),
+    ] {
+        let run = pulled(0.6, 0.05)
+            .ranks(ranks)
+            .set(format!("method.stress_update=\"{update}\""))
+            .set(format!("method.velocity_update={velocity}"))
+            .set(format!("method.mass=\"{mass}\""))
+            .results();
+        let last = |name: &str| *run.history(name).last().expect("rows");
+        let (work, energy) =
+            (last("work_external"), last("energy_strain") + last("energy_kinetic"));
+        assert!((energy / work - 1.0).abs() < 0.2, "{update} {velocity} {mass}: {energy} {work}");
+    }
+}
+
+/// What is granted to a moving boundary is soon less than what an unstable step brings.
+#[test]
+fn a_time_step_over_the_limit_is_named_where_a_boundary_moves() {
+    let outcome = pulled(60.0, 0.5).attempt();
+    assert_eq!(outcome.code, 1, "{}", outcome.stdout);
+    assert!(outcome.stderr.contains("energy has grown"), "{}", outcome.stderr);
+}
+
+/// The series of XPIC adds nothing where a boundary prescribes the velocity.
+#[test]
+fn xpic_moves_boundaries_as_prescribed() {
+    for order in [1, 2, 5] {
+        let run = blocks(&["shape = { box = { min = [1, 2], max = [4, 4] } }"])
+            .set("method.velocity_update=\"xpic\"")
+            .set(format!("method.xpic_order={order}"))
+            .set(
+                "boundary=[{ where = { box = { min = [0, 0], max = [8, 8] } }, \
+                 displacement = { x = 0.02, y = -0.01 } }]",
+            )
+            .results();
+        let points = run.points(60);
+        for (component, exact) in [0.02, -0.01].into_iter().enumerate() {
+            for u in points.component("displacement", component) {
+                assert!((u - exact).abs() < 1e-12, "order {order}: {u}");
+            }
+        }
+    }
+}
