@@ -107,6 +107,18 @@ goes from [0.0, 0.0] to [6.0, 4.0]; enlarge the grid, or move or cut the body",
         "error: body \"block\": point 19 at [6.5, 1.0] lies outside the grid; enlarge the grid or \
 move the body",
     );
+    // The point is inside, a corner of its domain is not.
+    let part =
+        "{ box = { min = [1, 1], max = [3, 2] } }, { box = { min = [0, 0], max = [1, 0.1] } }";
+    let run = replaced("points_per_cell = [2, 2]", "lattice = { spacing = 1.2, offset = [0, 0] }")
+        .set(format!("body.0.shape={{ union = [{part}] }}"))
+        .set("method.basis=\"cpdi2\"");
+    refused(
+        &run,
+        2,
+        "error: at the start corner 1 of point 0 is outside the grid at [-0.6, -0.6] m (the point is \
+at [0.0, 0.0] m); enlarge the grid, or let the mesh follow the body",
+    );
 }
 
 #[test]

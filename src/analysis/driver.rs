@@ -151,7 +151,12 @@ impl Run<'_> {
                 (model, points, Some(resume))
             }
         };
-        let active = discretise::active(world, &model, &points)?;
+        let active = discretise::active(world, &model, &points);
+        let active = active.map_err(|error| match error {
+            // Before any step it is the deck that puts a domain there.
+            Error::Run(text) if resume.is_none() => Error::Input(format!("at the start {text}")),
+            other => other,
+        })?;
         let warnings = match resume {
             None => first_state::check(world, &model, &points, &active.1)?,
             Some(_) => Vec::new(),
