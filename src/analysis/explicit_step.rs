@@ -128,7 +128,8 @@ pub(super) fn advance<const D: usize>(
         ),
         ..mesh.row(world, points)
     };
-    let sums = StepSums { energies, ghost, work, driven: driven(&mass, &mesh, &conditions, dt) };
+    let driven = mass.driven_energy(&mesh, &conditions.increment, dt);
+    let sums = StepSums { energies, ghost, work, driven };
     Ok((Solved { row, mesh, displacement, reaction, moved_grid: None }, sums))
 }
 
@@ -206,18 +207,6 @@ fn residual<const D: usize>(
 
 fn point_work<const D: usize>(external: &[[f64; D]], displacement: &[[f64; D]]) -> f64 {
     external.as_flattened().iter().zip(displacement.as_flattened()).map(|(f, u)| f * u).sum()
-}
-
-/// v M v of what boundaries move, of this rank, J.
-fn driven<const D: usize>(
-    mass: &GridMass,
-    mesh: &Discretisation<D>,
-    conditions: &Conditions,
-    dt: f64,
-) -> f64 {
-    let increment = &conditions.increment;
-    let product = mass.multiply(mesh, increment);
-    product.iter().zip(increment).map(|(mu, u)| mu * u).sum::<f64>() / (dt * dt)
 }
 
 fn boundary_work(conditions: &Conditions, residual: &[f64], displacement: &[f64]) -> f64 {

@@ -107,6 +107,18 @@ impl GridMass {
         }
     }
 
+    /// v M v of what boundaries move by `increment` (zero elsewhere) in a step of `dt`, of this
+    /// rank, J.
+    pub fn driven_energy<const D: usize>(
+        &self,
+        mesh: &Discretisation<D>,
+        increment: &[f64],
+        dt: f64,
+    ) -> f64 {
+        let product = self.multiply(mesh, increment);
+        product.iter().zip(increment).map(|(mu, u)| mu * u).sum::<f64>() / (dt * dt)
+    }
+
     /// Kinetic energy in the Ghost share, v M_G v / 2, of this rank, J.
     pub fn ghost_energy<const D: usize>(&self, mesh: &Discretisation<D>, velocity: &[f64]) -> f64 {
         match self {

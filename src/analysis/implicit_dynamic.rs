@@ -257,7 +257,8 @@ fn solve_step<const D: usize>(
         Ok(update::energies(points, &model.materials))
     })?;
 
-    let sums = StepSums { energies, ghost, work, driven: 0.0 };
+    let driven = mass.driven_energy(&mesh, &conditions.increment, newmark.dt);
+    let sums = StepSums { energies, ghost, work, driven };
     let reaction = at_held(&conditions, &supplied);
     let row = HistoryRow {
         step: number,

@@ -38,6 +38,15 @@ fn a_boundary_that_starts_to_move_makes_no_energy() {
     }
 }
 
+/// Nor is it one of an implicit step, where PIC gives the points that velocity at once.
+#[test]
+fn a_boundary_that_starts_to_move_is_no_fault_of_an_implicit_step() {
+    let run = pulled(0.6, 0.05)
+        .set("analysis={ type = \"implicit-dynamic\", steps = 20, duration = 0.6 }")
+        .set("method.velocity_update=\"pic\"");
+    assert_eq!(run.results().count("steps_completed"), 20);
+}
+
 /// What is granted to a moving boundary is soon less than what an unstable step brings.
 #[test]
 fn a_time_step_over_the_limit_is_named_where_a_boundary_moves() {
