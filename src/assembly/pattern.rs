@@ -197,6 +197,11 @@ impl Pattern {
                 continue;
             }
             let range = self.offsets[row as usize]..self.offsets[row as usize + 1];
+            // The owner never hears of a list without entries, and would take what is sent for
+            // it for the next message.
+            if range.is_empty() {
+                continue;
+            }
             let shifted = range.start - self.ghost_start..range.end - self.ghost_start;
             if self.sends.last().is_none_or(|(rank, _)| *rank != owner) {
                 self.sends.push((owner, shifted.clone()));

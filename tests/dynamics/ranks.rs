@@ -103,3 +103,18 @@ fn collision_in_space() {
     let one = run.results();
     assert_same(&one, &run.ranks(3).results(), 20, 1e-9);
 }
+
+/// On three ranks one has nodes of another in its cells that none of its points adds mass to: an
+/// empty message went to a rank that did not wait for it, and was taken for the next one.
+#[test]
+fn explicit_with_nodes_of_other_ranks_that_get_no_mass() {
+    let run = blocks(&["shape = { box = { min = [2, 0.5], max = [7.90961, 2.90248] } }"])
+        .set("analysis.steps=6")
+        .set("method.basis=\"cpdi2\"")
+        .set("ghost.mass_factor=0.25")
+        .set("grid={ type = \"lattice\", cells = [5, 9], h = [2.0, 0.5] }")
+        .set("boundary=[{ where = { side = \"left\" }, fix = [\"x\", \"y\"] }]")
+        .set("load=[{ gravity = [-0.6293, -22.22] }]")
+        .set("output.fields=[\"displacement\", \"velocity\", \"stress\"]");
+    on_all_ranks(&run, 6);
+}
