@@ -107,6 +107,12 @@ goes from [0.0, 0.0] to [6.0, 4.0]; enlarge the grid, or move or cut the body",
         "error: body \"block\": point 19 at [6.5, 1.0] lies outside the grid; enlarge the grid or \
 move the body",
     );
+    let far = "{ box = { min = [0, 0], max = [1, 1e300] } }, { where = \"y < 1\" }";
+    let run = replaced("points_per_cell = [2, 2]", "lattice = { spacing = 0.5 }")
+        .set(format!("body.0.shape={{ intersection = [{far}] }}"));
+    let outcome = run.attempt();
+    assert_eq!(outcome.code, 2, "{}", outcome.stderr);
+    assert!(outcome.stderr.contains("more places than can be numbered"), "{}", outcome.stderr);
     // The point is inside, a corner of its domain is not.
     let part =
         "{ box = { min = [1, 1], max = [3, 2] } }, { box = { min = [0, 0], max = [1, 0.1] } }";
@@ -116,7 +122,7 @@ move the body",
     refused(
         &run,
         2,
-        "error: at the start corner 1 of point 0 is outside the grid at [-0.6, -0.6] m (the point is \
+        "error: at the start corner 1 of point 7 is outside the grid at [-0.6, -0.6] m (the point is \
 at [0.0, 0.0] m); enlarge the grid, or let the mesh follow the body",
     );
 }

@@ -196,6 +196,9 @@ fn per_cell<const D: usize>(
     (cells * per_cell) as u64
 }
 
+/// Places of a lattice are numbered by values that are exact as 64-bit floats, too.
+const MOST_PLACES: f64 = (1_u64 << 53) as f64;
+
 /// Points at offset + (i, j, k) spacing in the shape's frame, kept where they are inside.
 #[allow(clippy::too_many_arguments)]
 fn on_lattice<const D: usize>(
@@ -215,6 +218,16 @@ fn on_lattice<const D: usize>(
             body.name
         )));
     };
+    let place = |x: f64, axis: usize| (x - offset[axis]) / spacing;
+    let places: f64 = (0..D).map(|a| place(max[a], a) - place(min[a], a) + 4.0).product();
+    let far = (0..D).map(|a| place(min[a], a).abs().max(place(max[a], a).abs()));
+    if !(far.fold(places, f64::max) < MOST_PLACES) {
+        return Err(Error::Input(format!(
+            "body \"{}\": a lattice of spacing {spacing} over its shape, from {min:?} to {max:?}, \
+             has more places than can be numbered; make the shape smaller or the spacing larger",
+            body.name
+        )));
+    }
     let low: [i64; D] =
         std::array::from_fn(|a| ((min[a] - offset[a]) / spacing).floor() as i64 - 1);
     let size: [usize; D] = std::array::from_fn(|a| {
