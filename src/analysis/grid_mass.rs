@@ -115,6 +115,9 @@ impl GridMass {
         increment: &[f64],
         dt: f64,
     ) -> f64 {
+        if increment.iter().all(|&u| u == 0.0) {
+            return 0.0;
+        }
         let product = self.multiply(mesh, increment);
         product.iter().zip(increment).map(|(mu, u)| mu * u).sum::<f64>() / (dt * dt)
     }

@@ -136,6 +136,13 @@ fn bounding_box<const D: usize>(
     (low.map(|x| x - reach), high.map(|x| x + reach))
 }
 
+/// Whether a cell that `x` is `outside` of is to be taken before one at `known`, or within this limit as
+/// the `first`. Of cells equally near the lowest-numbered one is kept: round-off, which differs with
+/// the number of ranks, must not decide, as their functions differ out there.
+fn closer(outside: f64, known: f64, first: bool) -> bool {
+    if first { outside <= known } else { outside < known - EDGE_TOLERANCE }
+}
+
 impl<const D: usize> Mesh<D> {
     /// The cell that holds `x`, `None` outside the mesh.
     pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
@@ -198,10 +205,7 @@ impl<const D: usize> Mesh<D> {
             let positions = self.cell_positions(cell);
             let nodes = &positions[..self.element.node_count()];
             let j = element::jacobian(nodes, &self.element.shape_gradients(&xi));
-            if element::determinant(&j) > 0.0
-                && (outside < depth || best.is_none())
-                && outside <= depth
-            {
+            if element::determinant(&j) > 0.0 && closer(outside, depth, best.is_none()) {
                 depth = outside;
                 best = Some((cell, xi));
             }
@@ -220,7 +224,7 @@ impl<const D: usize> Mesh<D> {
                 let cell = cell as usize;
                 if self.across_raw(cell).contains(&OUTSIDE)
                     && let Some((xi, outside)) = self.reference_of(cell, x, smallest)
-                    && (outside < smallest || (best.is_none() && outside <= smallest))
+                    && closer(outside, smallest, best.is_none())
                 {
                     smallest = outside;
                     best = Some((cell, xi));

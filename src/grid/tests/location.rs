@@ -57,6 +57,42 @@ fn bins_find_what_a_search_through_all_cells_finds() {
     }
 }
 
+/// Straight beyond an outer node its cells are equally near.
+#[test]
+fn round_off_does_not_choose_among_cells_equally_near() {
+    fn check<const D: usize>(mesh: &Mesh<D>, h: f64) {
+        let mut next = scatter(11);
+        let middle: [f64; D] = std::array::from_fn(|a| {
+            let nodes = 0..mesh.node_count();
+            nodes.map(|n| mesh.node_position(n)[a]).sum::<f64>() / mesh.node_count() as f64
+        });
+        let mut asked = 0;
+        for node in 0..mesh.node_count() {
+            let x = mesh.node_position(node);
+            for axis in 0..D {
+                let mut beyond = x;
+                beyond[axis] += 0.1 * h * (x[axis] - middle[axis]).signum();
+                let Some((first, _)) = mesh.locate_near(&beyond, REACH, None) else { continue };
+                for _ in 0..20 {
+                    let near = beyond.map(|x| x + 1e-14 * h * (next() - 0.5));
+                    let found = mesh.locate_near(&near, REACH, None).map(|(cell, _)| cell);
+                    if mesh.locate(&near).is_none() {
+                        asked += 1;
+                        assert_eq!(found, Some(first), "{:?} {near:?}", mesh.element);
+                    }
+                }
+            }
+        }
+        assert!(asked > 100, "{asked}");
+    }
+    for element in [Element::Quad4, Element::Tri3] {
+        check(&box_mesh([0.1, 0.3], [1.0, 1.5], [3, 4], element).unwrap(), 0.3);
+    }
+    for element in [Element::Hex8, Element::Tet4] {
+        check(&box_mesh([0.1, 0.3, 0.7], [1.0, 1.5, 1.6], [3, 4, 3], element).unwrap(), 0.3);
+    }
+}
+
 #[test]
 fn location_follows_a_mesh_that_turned() {
     let mut mesh = ring([6.0, 4.0], Element::Quad4, 2.0);
