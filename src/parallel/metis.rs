@@ -2,7 +2,7 @@
 
 use std::sync::Mutex;
 
-use metis::option::{NCuts, Seed, UFactor};
+use metis::option::{Seed, UFactor};
 
 use crate::error::{Error, Result};
 
@@ -20,11 +20,6 @@ pub struct Graph {
 
 /// Sum of the integer weights handed to METIS: fine enough for any cost, far from overflow.
 const WEIGHT_TOTAL: f64 = (1u32 << 28) as f64;
-
-/// Partitions that METIS makes to take the one with the shortest cut, of graphs of at most [`SMALL`]
-/// units: it takes milliseconds, and messages get up to a fifth shorter.
-const TRIES: metis::Idx = 10;
-const SMALL: usize = 20_000;
 
 /// Part of each unit, `0..parts`; no part is empty if there are as many units as parts, and
 /// the same graph always gives the same answer. Error: METIS refused.
@@ -50,7 +45,6 @@ pub fn split(graph: &Graph, parts: usize) -> Result<Vec<u32>> {
         .map_err(|error| refused(&error))?
         .set_vwgt(&weights)
         .set_adjwgt(&graph.contacts)
-        .set_option(NCuts(if units <= SMALL { TRIES } else { 1 }))
         .set_option(Seed(1));
     // Recursive bisection balances few parts better, k-way is faster for many.
     if parts <= 8 {
