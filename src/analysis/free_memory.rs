@@ -2,10 +2,10 @@
 //! control groups (batch systems and containers set them) and of its address space.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Bytes; `None` where nothing is said.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct FreeMemory {
     /// Of the machine, shared by the ranks on it.
     pub machine: Option<f64>,
@@ -46,15 +46,11 @@ fn of_groups(root: &Path, table: &str) -> Option<f64> {
     let groups = lines.flat_map(|(controllers, path)| {
         let named = move |name: &str| controllers.split(',').any(|controller| controller == name);
         let known = HIERARCHIES.iter().filter(move |(_, name)| named(name));
-        known.flat_map(move |(folder, _)| ancestors(root.join(folder), path))
+        // The group, its parents, and the hierarchy's root: the own group inside a container.
+        let ways = known.map(|(folder, _)| root.join(folder));
+        ways.flat_map(move |top| Path::new(path).ancestors().map(move |group| top.join(group)))
     });
     groups.filter_map(|group| of_group(&group)).reduce(f64::min)
-}
-
-/// `path` below `root`, its parents, and `root` itself, which is the group's own inside a container.
-fn ancestors(root: PathBuf, path: &str) -> impl Iterator<Item = PathBuf> {
-    let below: Vec<PathBuf> = Path::new(path).ancestors().map(|group| root.join(group)).collect();
-    below.into_iter()
 }
 
 fn of_group(group: &Path) -> Option<f64> {
