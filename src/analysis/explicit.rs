@@ -12,6 +12,7 @@ use super::explicit_nodes::Halt;
 use super::explicit_step::advance;
 use super::ledger::{Entry, Ledger, StepSums};
 use super::recorder::{Ending, Recorder};
+use super::snapshot::Snapshot;
 use super::step_end::{self, End};
 use super::stepping::Moment;
 use super::time_step::{TimeSteps, stability_limit};
@@ -51,13 +52,11 @@ pub fn run<const D: usize>(
         ledger.save(&mut state);
         state
     };
-    let mut before = update::Snapshot::default();
+    let mut before = Snapshot::default();
     while let Some(span) = steps.next(limit) {
         let number = steps.number();
         let at = |why: &str| format!("step {number} (to t = {:.6e} s): {why}", span.time_end);
-        // The points are as they were where a step fails.
-        before.record(points, model.deck.method.basis);
-        let (mut solved, sums) = match advance(world, model, points, clock, span) {
+        let (mut solved, sums) = match advance(world, model, points, &mut before, clock, span) {
             Ok(done) => done,
             Err(Halt::Failed(error)) if !matches!(error, Error::Run(_) | Error::Input(_)) => {
                 return Err(error);

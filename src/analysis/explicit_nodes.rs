@@ -17,6 +17,7 @@ use super::discretise::{Discretisation, Model};
 use super::grid_mass::{GridMass, Inverse, require_mass};
 use super::mapping::{self, Pushed};
 use super::nodal_sums::{over_points, to_points};
+use super::snapshot::Snapshot;
 use super::transport::Carrier;
 use super::update::{self, PointEnergies, Refusal};
 
@@ -177,6 +178,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         carrier: Carrier,
         velocity: &[f64],
         points: &mut Points<D>,
+        before: &mut Snapshot<D>,
     ) -> std::result::Result<(Vec<Square<D>>, PointEnergies), Halt> {
         let step = self.mesh.step_points(points, &self.model.materials);
         let flip = self.model.deck.method.flip;
@@ -191,7 +193,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         if let Some(refusal) = update::deformation_to_refuse(self.world, points, &deformation) {
             return Err(refusal.into());
         }
-        let energies = update::deform(&self.model.materials, &deformation, points);
+        let energies = update::deform(&self.model.materials, &deformation, points, Some(before));
         Ok((deformation, energies))
     }
 

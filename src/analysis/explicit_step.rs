@@ -20,19 +20,22 @@ use super::grid_mass::GridMass;
 use super::ledger::StepSums;
 use super::mapping::{self, Pushed};
 use super::reactions::{at_held, reactions};
+use super::snapshot::Snapshot;
 use super::step_end::Solved;
 use super::transport::{self, Carrier};
 use super::update::{self, Increments};
 
-/// One time step; the points end at their new state, not yet migrated. The row lacks the ledger's
-/// columns. Collective.
+/// One time step; the points end at their new state, not yet migrated, and `before` holds what was
+/// overwritten so far, after a failure too. The row lacks the ledger's columns. Collective.
 pub(super) fn advance<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &mut Points<D>,
+    before: &mut Snapshot<D>,
     clock: &mut Clock,
     span: StepSpan,
 ) -> std::result::Result<(Solved<D>, StepSums), Halt> {
+    before.begin();
     let (deck, grid) = (&model.deck, &model.grid);
     let (method, dt) = (&deck.method, span.time_end - span.time_start);
     let usf = method.stress_update == StressUpdate::Usf;
@@ -58,7 +61,7 @@ pub(super) fn advance<const D: usize>(
     let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;
     let carrier = carrier(model);
     let first = match method.stress_update {
-        StressUpdate::Usf => Some(nodes.deform_first(carrier, &velocity, points)?),
+        StressUpdate::Usf => Some(nodes.deform_first(carrier, &velocity, points, before)?),
         StressUpdate::Usl | StressUpdate::Musl => None,
     };
     let Forces { pushed, mut acceleration } = match (forces, &first) {
@@ -91,7 +94,7 @@ pub(super) fn advance<const D: usize>(
     clock.add(Phase::Solve, nodes.seconds);
     let energies = clock.time(Phase::Update, || {
         if !usf {
-            update::stretch(&made.deformation, points);
+            update::stretch(&made.deformation, points, Some(before));
         }
         let followed = update::follow(
             grid,
@@ -101,14 +104,15 @@ pub(super) fn advance<const D: usize>(
             &moved,
             &made,
             points,
+            Some(before),
         );
         world.fail_together(followed)?;
-        let respond =
-            |points: &mut Points<D>| update::respond(&model.materials, &made.deformation, points);
-        let energies = energies.unwrap_or_else(|| respond(points));
-        update::move_points(&made.displacement, points);
-        points.velocity = new_velocity;
-        points.acceleration = rate;
+        let energies = energies.unwrap_or_else(|| {
+            update::respond(&model.materials, &made.deformation, points, Some(before))
+        });
+        update::move_points(&made.displacement, points, Some(before));
+        before.velocity.replace(&mut points.velocity, new_velocity);
+        before.acceleration.replace(&mut points.acceleration, rate);
         Ok(energies)
     })?;
 

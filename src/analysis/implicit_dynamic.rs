@@ -25,6 +25,7 @@ use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
 use super::reactions::{at_held, reactions};
 use super::recorder::{Ending, Recorder};
+use super::snapshot::Snapshot;
 use super::solver::Trials;
 use super::step_end::{End, Solved};
 use super::stepping::Stepping;
@@ -71,12 +72,13 @@ pub fn run<const D: usize>(
         state.set("ghost_energy", ghost_energy);
         state
     };
-    let mut before = update::Snapshot::default();
+    let mut before = Snapshot::default();
     while let Some(span) = stepping.next_span() {
         let number = stepping.step_number();
-        // The points are as they were where a step fails.
-        before.record(points, model.deck.method.basis);
-        let outcome = solve_step(world, model, points, recorder, clock, &mut trials, span, number);
+        before.begin();
+        let kept = &mut before;
+        let outcome =
+            solve_step(world, model, points, kept, recorder, clock, &mut trials, span, number);
         let outcome = match outcome {
             Ok(Ok(mut step)) => {
                 let entry = Entry::unite(world, points, step.sums);
@@ -171,6 +173,7 @@ fn solve_step<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &mut Points<D>,
+    before: &mut Snapshot<D>,
     recorder: &mut Recorder,
     clock: &mut Clock,
     trials: &mut Trials,
@@ -251,9 +254,11 @@ fn solve_step<const D: usize>(
             &displacement,
             &made,
             points,
+            Some(before),
         );
         world.fail_together(updated)?;
-        (points.velocity, points.acceleration) = (rates.velocity, rates.acceleration);
+        before.velocity.replace(&mut points.velocity, rates.velocity);
+        before.acceleration.replace(&mut points.acceleration, rates.acceleration);
         Ok(update::energies(points, &model.materials))
     })?;
 

@@ -19,6 +19,7 @@
 //! | Newton's method for a step | `newton.rs` | |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
+//! | back to a step's start where it fails | `snapshot.rs` | |
 //! | the mesh between steps | `motion.rs` | Rotation §2 (viii) |
 //! | migrate, and a new partition where it pays | `balance.rs` (`parallel/migrate.rs`) | |
 //! | what every accepted step ends with | `step_end.rs` | |
@@ -59,6 +60,7 @@ pub mod reactions;
 pub mod recorder;
 mod room;
 pub mod setup;
+pub mod snapshot;
 pub mod solver;
 pub mod step_end;
 pub mod stepping;

@@ -186,6 +186,7 @@ fn solve_step<const D: usize>(
             &displacement,
             &made,
             points,
+            None,
         );
         world.fail_together(updated)?;
         Ok(update::energies(points, &model.materials))

@@ -18,6 +18,8 @@ use crate::parallel::World;
 use crate::points::Points;
 use crate::tensor::{self, Spectrum};
 
+use super::snapshot::{Former, Snapshot};
+
 /// Increments at each point of this rank, computed but not yet applied.
 pub struct Increments<const D: usize> {
     /// dF
@@ -199,7 +201,8 @@ fn nodal_displacement<const D: usize>(
     }
 }
 
-/// Applies the increments: F, b_e, stress, history, domains, positions.
+/// Applies the increments: F, b_e, stress, history, domains, positions. What they overwrite is kept
+/// where a snapshot `before` is given, here and below.
 #[allow(clippy::too_many_arguments)]
 pub fn apply<const D: usize>(
     grid: &Grid<D>,
@@ -210,10 +213,12 @@ pub fn apply<const D: usize>(
     displacement: &[f64],
     increments: &Increments<D>,
     points: &mut Points<D>,
+    mut before: Option<&mut Snapshot<D>>,
 ) -> Result<()> {
-    deform(materials, &increments.deformation, points);
-    follow(grid, basis, rule, numbering, displacement, increments, points)?;
-    move_points(&increments.displacement, points);
+    deform(materials, &increments.deformation, points, before.as_deref_mut());
+    let kept = before.as_deref_mut();
+    follow(grid, basis, rule, numbering, displacement, increments, points, kept)?;
+    move_points(&increments.displacement, points, before);
     Ok(())
 }
 
@@ -223,19 +228,53 @@ pub fn deform<const D: usize>(
     materials: &[Material],
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
+    mut before: Option<&mut Snapshot<D>>,
 ) -> PointEnergies {
-    stretch(increments, points);
-    respond(materials, increments, points)
+    stretch(increments, points, before.as_deref_mut());
+    respond(materials, increments, points, before)
 }
 
 /// F of the increments dF alone: what [`follow`] reads.
-pub fn stretch<const D: usize>(increments: &[[[f64; D]; D]], points: &mut Points<D>) {
-    for (gradient, increment) in points.deformation_gradient.iter_mut().zip(increments) {
+pub fn stretch<const D: usize>(
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+    before: Option<&mut Snapshot<D>>,
+) {
+    let after = |old: &Matrix3<f64>, increment: &[[f64; D]; D]| {
         // The rows and columns beyond D are those of the identity.
-        let before = *gradient;
+        let mut gradient = *old;
         for j in 0..3 {
             for i in 0..D {
-                gradient[(i, j)] = (0..D).map(|k| increment[i][k] * before[(k, j)]).sum();
+                gradient[(i, j)] = (0..D).map(|k| increment[i][k] * old[(k, j)]).sum();
+            }
+        }
+        gradient
+    };
+    overwrite(
+        &mut points.deformation_gradient,
+        before.map(|before| &mut before.deformation_gradient),
+        increments,
+        after,
+    );
+}
+
+/// Each value of an array from the old one and what it meets in `with`.
+fn overwrite<T: Copy, W>(
+    values: &mut Vec<T>,
+    former: Option<&mut Former<T>>,
+    with: &[W],
+    after: impl Fn(&T, &W) -> T,
+) {
+    match former {
+        Some(former) => {
+            former.set_aside(values);
+            for ((value, old), with) in values.iter_mut().zip(former.values()).zip(with) {
+                *value = after(old, with);
+            }
+        }
+        None => {
+            for (value, with) in values.iter_mut().zip(with) {
+                *value = after(value, with);
             }
         }
     }
@@ -246,23 +285,39 @@ pub fn respond<const D: usize>(
     materials: &[Material],
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
+    mut before: Option<&mut Snapshot<D>>,
 ) -> PointEnergies {
+    if let Some(before) = &mut before {
+        before.elastic_left_cauchy_green.set_aside(&mut points.elastic_left_cauchy_green);
+        before.kirchhoff_stress.set_aside(&mut points.kirchhoff_stress);
+        before.plastic_strain.set_aside(&mut points.plastic_strain);
+        before.dissipation.set_aside(&mut points.dissipation);
+    }
+    let before = before.as_deref();
     let mut sum = PointEnergies::default();
     let mut states = [StressState::default(); BATCH];
     for (batch, increments) in increments.chunks(BATCH).enumerate() {
         let first = batch * BATCH;
+        let elastic = match before {
+            Some(before) => before.elastic_left_cauchy_green.values(),
+            None => &points.elastic_left_cauchy_green,
+        };
         let start = |k: usize| StepStart {
             material: &materials[points.body[first + k] as usize],
             deformation_gradient: &points.deformation_gradient[first + k],
-            elastic_left_cauchy_green: &points.elastic_left_cauchy_green[first + k],
+            elastic_left_cauchy_green: &elastic[first + k],
             volume_initial: points.volume_initial[first + k],
         };
         mechanics::stresses(start, increments, &mut states);
         for (p, state) in (first..first + increments.len()).zip(&states) {
+            let (strain, lost) = match before {
+                Some(before) => (before.plastic_strain.values()[p], before.dissipation.values()[p]),
+                None => (points.plastic_strain[p], points.dissipation[p]),
+            };
             points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
             points.kirchhoff_stress[p] = state.kirchhoff_stress;
-            points.plastic_strain[p] += state.plastic_increment;
-            points.dissipation[p] += state.dissipation;
+            points.plastic_strain[p] = strain + state.plastic_increment;
+            points.dissipation[p] = lost + state.dissipation;
             sum.strain += state.stored_energy * points.volume_initial[p];
             sum.plastic += points.dissipation[p] * points.volume_initial[p];
         }
@@ -270,59 +325,10 @@ pub fn respond<const D: usize>(
     sum
 }
 
-/// The state that a step overwrites, to go back to where it fails. Kept from step to step, so
-/// that recording allocates only where points have come.
-#[derive(Default)]
-pub struct Snapshot<const D: usize> {
-    position: Vec<[f64; D]>,
-    velocity: Vec<[f64; D]>,
-    acceleration: Vec<[f64; D]>,
-    deformation_gradient: Vec<Matrix3<f64>>,
-    elastic_left_cauchy_green: Vec<Matrix3<f64>>,
-    kirchhoff_stress: Vec<Matrix3<f64>>,
-    plastic_strain: Vec<f64>,
-    dissipation: Vec<f64>,
-    half_length: Vec<[f64; D]>,
-    corners: Vec<[[f64; D]; 8]>,
-}
-
-impl<const D: usize> Snapshot<D> {
-    /// `basis`: corners move with `cpdi2` only.
-    pub fn record(&mut self, points: &Points<D>, basis: Basis) {
-        self.position.clone_from(&points.position);
-        self.velocity.clone_from(&points.velocity);
-        self.acceleration.clone_from(&points.acceleration);
-        self.deformation_gradient.clone_from(&points.deformation_gradient);
-        self.elastic_left_cauchy_green.clone_from(&points.elastic_left_cauchy_green);
-        self.kirchhoff_stress.clone_from(&points.kirchhoff_stress);
-        self.plastic_strain.clone_from(&points.plastic_strain);
-        self.dissipation.clone_from(&points.dissipation);
-        self.half_length.clone_from(&points.half_length);
-        if basis == Basis::Cpdi2 {
-            self.corners.clone_from(&points.corners);
-        }
-    }
-
-    /// The points as they were recorded.
-    pub fn restore(&self, points: &mut Points<D>) {
-        points.position.clone_from(&self.position);
-        points.velocity.clone_from(&self.velocity);
-        points.acceleration.clone_from(&self.acceleration);
-        points.deformation_gradient.clone_from(&self.deformation_gradient);
-        points.elastic_left_cauchy_green.clone_from(&self.elastic_left_cauchy_green);
-        points.kirchhoff_stress.clone_from(&self.kirchhoff_stress);
-        points.plastic_strain.clone_from(&self.plastic_strain);
-        points.dissipation.clone_from(&self.dissipation);
-        points.half_length.clone_from(&self.half_length);
-        if !self.corners.is_empty() {
-            points.corners.clone_from(&self.corners);
-        }
-    }
-}
-
 /// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
 /// those of the step's start. `displacement` is the one that made the increments, which
 /// [`unsound_domain`] has passed.
+#[allow(clippy::too_many_arguments)]
 pub fn follow<const D: usize>(
     grid: &Grid<D>,
     basis: Basis,
@@ -331,7 +337,14 @@ pub fn follow<const D: usize>(
     displacement: &[f64],
     increments: &Increments<D>,
     points: &mut Points<D>,
+    before: Option<&mut Snapshot<D>>,
 ) -> Result<()> {
+    if let Some(before) = before {
+        before.half_length.copy(&points.half_length);
+        if basis == Basis::Cpdi2 {
+            before.corners.set_aside(&mut points.corners);
+        }
+    }
     if basis == Basis::Cpdi2 {
         points.corners.copy_from_slice(&increments.corners);
     }
@@ -344,12 +357,15 @@ pub fn follow<const D: usize>(
 }
 
 /// Lagrangian eq. 31, Ghost eq. 9, 14.
-pub fn move_points<const D: usize>(displacement: &[[f64; D]], points: &mut Points<D>) {
-    for (x, moved) in points.position.iter_mut().zip(displacement) {
-        for (x, m) in x.iter_mut().zip(moved) {
-            *x += m;
-        }
-    }
+pub fn move_points<const D: usize>(
+    displacement: &[[f64; D]],
+    points: &mut Points<D>,
+    before: Option<&mut Snapshot<D>>,
+) {
+    let former = before.map(|before| &mut before.position);
+    overwrite(&mut points.position, former, displacement, |x, moved| {
+        std::array::from_fn(|i| x[i] + moved[i])
+    });
 }
 
 /// dF of plane strain has dF_zz = 1.

@@ -382,6 +382,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
             &displacement,
             &made,
             &mut moved,
+            None,
         )
         .expect("the increments are sound");
         black_box(&moved);
