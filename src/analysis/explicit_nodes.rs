@@ -54,6 +54,9 @@ pub(super) struct Nodes<'a, const D: usize> {
     /// Held components move with their boundary's mean velocity over the step.
     held_velocity: Vec<f64>,
     at_rest: Vec<f64>,
+    /// What the points take from held velocities by their PIC share, N s: of the owned degrees of
+    /// freedom, zero where nothing holds. Empty with flip.
+    pub taken: Vec<f64>,
     /// Wall seconds of the solves so far.
     pub seconds: f64,
 }
@@ -99,6 +102,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
             dt,
             held_velocity,
             at_rest,
+            taken: Vec::new(),
             seconds,
         })
     }
@@ -112,11 +116,12 @@ impl<'a, const D: usize> Nodes<'a, D> {
         clock: &mut Clock,
     ) -> Result<(Vec<f64>, Option<Forces<D>>)> {
         let step = self.mesh.step_points(points, &self.model.materials);
-        let method = &self.model.deck.method;
-        let (mut velocity, forces) = if method.stress_update == StressUpdate::Usf {
+        let (deck, halo) = (&self.model.deck, &self.mesh.numbering.halo);
+        let (momentum, mut velocity, forces) = if deck.method.stress_update == StressUpdate::Usf {
             let momentum =
                 clock.time(Phase::Assemble, || Ok(self.momentum(step, &points.velocity)))?;
-            (self.solve(&momentum, None)?, None)
+            let velocity = self.solve(&momentum, None)?;
+            (momentum, velocity, None)
         } else {
             let [momentum, pushed] = clock.time(Phase::Assemble, || {
                 Ok(over_points(self.world, self.mesh, |part, [momenta, forces]| {
@@ -128,13 +133,31 @@ impl<'a, const D: usize> Nodes<'a, D> {
             let [velocity, acceleration] = timed(&mut self.seconds, || {
                 self.inverse.solve_two([&momentum, &pushed], prescribed)
             })?;
-            (velocity, Some(Forces { pushed, acceleration }))
+            (momentum, velocity, Some(Forces { pushed, acceleration }))
         };
-        if let Some(order) = method.xpic {
-            self.mesh.numbering.halo.forward(self.world, &mut velocity, D)?;
+        let takes = deck.method.flip < 1.0 && !deck.boundaries.is_empty();
+        if takes || deck.method.xpic.is_some() {
+            halo.forward(self.world, &mut velocity, D)?;
+        }
+        if takes {
+            self.taken = vec![0.0; self.mesh.numbering.owned * D];
+            self.take(1.0 - deck.method.flip, &velocity, &momentum);
+        }
+        if let Some(order) = deck.method.xpic {
             velocity = self.sharpen(step, velocity, order)?;
         }
         Ok((velocity, forces))
+    }
+
+    /// Adds `share` times M~ v - P, P = `momentum`, where boundaries hold: as much more than P
+    /// comes back to points that take the velocity v of the nodes. Elsewhere v = M~^-1 P.
+    fn take(&mut self, share: f64, velocity: &[f64], momentum: &[[f64; D]]) {
+        let carried = self.mass.multiply(self.mesh, velocity);
+        let fixed = &self.conditions.fixed;
+        let sums = momentum.as_flattened();
+        for (dof, taken) in self.taken.iter_mut().enumerate().filter(|&(dof, _)| fixed[dof]) {
+            *taken += share * (carried[dof] - sums[dof]);
+        }
     }
 
     /// The forces after the points have taken the step's `deformation`. Collective.
@@ -265,6 +288,11 @@ impl<'a, const D: usize> Nodes<'a, D> {
         for _ in 1..order {
             let back = mapping::at_points(step, &term);
             let momentum = self.momentum(step, &back);
+            if !self.taken.is_empty() {
+                // The next term is this one less what is mapped back, so that its momentum over all
+                // nodes is what the held ones keep of it.
+                self.take(-1.0, &term, &momentum);
+            }
             let mapped =
                 timed(&mut self.seconds, || self.inverse.solve_to_ghosts(&momentum, &term, None))?;
             for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {

@@ -86,7 +86,10 @@ pub(super) fn advance<const D: usize>(
         clock.time(Phase::Update, || Ok(increments(step, &moved, deforming, deformation)))?;
     clock.time(Phase::Update, || Ok(refuse(world, model, &mesh, points, &mut made, &moved)))??;
 
-    let residual = residual(&mass, &mesh, &acceleration, &pushed);
+    let mut residual = residual(&mass, &mesh, &acceleration, &pushed);
+    for (r, taken) in residual.iter_mut().zip(&nodes.taken) {
+        *r += taken / dt;
+    }
     let work = point_work(&external, &made.displacement)
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);

@@ -75,3 +75,52 @@ fn xpic_moves_boundaries_as_prescribed() {
         }
     }
 }
+
+/// A PIC share gives the points the nodes' velocity, which boundaries prescribe where they hold:
+/// the impulse of that, too, is in the reaction.
+#[test]
+fn reactions_make_up_for_the_change_of_momentum() {
+    for (update, velocity, order, mass, ranks) in [
+        ("usl", "\"flip\"", None, "consistent", 1),
+        ("usl", "0.6", None, "consistent", 2),
+        ("musl", "\"pic\"", None, "lumped", 1),
+        ("usf", "0.3", None, "consistent", 1),
+        ("usf", "\"pic\"", None, "lumped", 3),
+        ("usl", "\"xpic\"", Some(1), "lumped", 1),
+        ("usl", "\"xpic\"", Some(2), "lumped", 2),
+        ("musl", "\"xpic\"", Some(5), "lumped", 1),
+    ] {
+        let mut run = blocks(&["shape = { box = { min = [0, 2], max = [4, 4] } }\n\
+                                velocity = [-0.4, \"0.3 * X\"]"])
+        .ranks(ranks)
+        .set("ghost={ mass_factor = 0.25 }")
+        .set(
+            "boundary=[{ name = \"wall\", where = { box = { min = [0, 0], max = [1, 8] } }, \
+             fix = [\"x\", \"y\"] }, { name = \"head\", \
+             where = { box = { min = [4, 0], max = [8, 8] } }, displacement = { x = 0.02 } }]",
+        )
+        .set(format!("method.stress_update=\"{update}\""))
+        .set(format!("method.velocity_update={velocity}"))
+        .set(format!("method.mass=\"{mass}\""));
+        if let Some(order) = order {
+            run = run.set(format!("method.xpic_order={order}"));
+        }
+        let run = run.results();
+        let dt = run.history("dt");
+        for axis in ["x", "y"] {
+            let momentum = run.history(&format!("momentum_{axis}"));
+            let [wall, head] =
+                ["wall", "head"].map(|name| run.history(&format!("reaction.{name}.{axis}")));
+            let scale = momentum.iter().fold(0.0f64, |scale, p| scale.max(p.abs()));
+            assert!(scale > 0.0);
+            for k in 1..momentum.len() {
+                let gained = momentum[k] - momentum[k - 1];
+                let given = (wall[k] + head[k]) * dt[k];
+                assert!(
+                    (gained - given).abs() < 1e-11 * scale,
+                    "{update} {velocity} {order:?} {mass}, {axis}, row {k}: {gained} {given}"
+                );
+            }
+        }
+    }
+}
