@@ -1,7 +1,7 @@
 //! What a step overwrites, to go back to where it fails.
 //!
 //! Nothing is copied ahead: where an array gets new values, the old one is set aside and the new
-//! values go into the one set aside a step before. A copy of the whole state was a fifth of the
+//! values go into the one set aside a step before. A copy of the whole state was a quarter of the
 //! bytes of an explicit step, and the part of it that a second core sped up least.
 
 use nalgebra::Matrix3;

@@ -262,6 +262,8 @@ impl Numbers {
             if self.gimp { TENSOR + 8.0 + 2.0 * self.vector() } else { 0.0 },
             self.plane() + 3.0 * TENSOR + 44.0,
             3.0 * self.vector(),
+            // half lengths kept in case the step fails
+            2.0 * self.vector(),
         ];
         let stress = [
             6.0 * d * d,
@@ -283,10 +285,10 @@ impl Numbers {
             ),
             // cells found and kept; their order, with the points' identities
             count("migrate", &[self.vector() + 8.0, 16.0], 2.0 * d),
-            // a copy in case the step fails; sums of energy, momentum and its moment
+            // sums of energy, momentum and its moment
             count(
                 "other",
-                &[2.0 * (3.0 * TENSOR + 16.0 + 4.0 * self.vector()), 8.0 + 2.0 * self.vector()],
+                &[8.0 + 2.0 * self.vector()],
                 5.0 * d + if self.dimension == 2 { 4.0 } else { 12.0 },
             ),
         ]

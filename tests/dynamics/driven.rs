@@ -16,14 +16,15 @@ fn pulled(duration: f64, metres: f64) -> Run {
 }
 
 /// The strain of the first step is there before the reaction that does its work: no fault of the
-/// time step. Over the whole pull work and energy agree.
+/// time step. Over the whole pull work and energy agree, but for what PIC loses: points that are
+/// caught by moving nodes take twice the energy that they keep.
 #[test]
 fn a_boundary_that_starts_to_move_makes_no_energy() {
-    for (update, velocity, mass, ranks) in [
-        ("musl", "\"flip\"", "consistent", 1),
-        ("usl", "\"flip\"", "lumped", 2),
-        ("usf", "0.5", "consistent", 1),
-        ("musl", "\"pic\"", "lumped", 1),
+    for (update, velocity, mass, ranks, least) in [
+        ("musl", "\"flip\"", "consistent", 1, 0.8),
+        ("usl", "\"flip\"", "lumped", 2, 0.8),
+        ("usf", "0.5", "consistent", 1, 0.8),
+        ("musl", "\"pic\"", "lumped", 1, 0.5),
     ] {
         let run = pulled(0.6, 0.05)
             .ranks(ranks)
@@ -34,7 +35,8 @@ fn a_boundary_that_starts_to_move_makes_no_energy() {
         let last = |name: &str| *run.history(name).last().expect("rows");
         let (work, energy) =
             (last("work_external"), last("energy_strain") + last("energy_kinetic"));
-        assert!((energy / work - 1.0).abs() < 0.2, "{update} {velocity} {mass}: {energy} {work}");
+        let kept = energy / work;
+        assert!((least..1.2).contains(&kept), "{update} {velocity} {mass}: {energy} {work}");
     }
 }
 
