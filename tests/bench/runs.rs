@@ -1,6 +1,6 @@
 //! Whole runs of the program: the §7.3 beam, two ranks beside one, memory per point and node.
 //!
-//! `cargo bench --bench runs [-- beam|pairs|mesh|memory|triad|products ...]`. Wall times: on a machine that is busy
+//! `cargo bench --bench runs [-- beam|pairs|mesh|dense|memory|triad|products ...]`. Wall times: on a machine that is busy
 //! they say little; the load is printed beside them.
 
 mod limits;
@@ -49,6 +49,17 @@ fn main() {
             let name = format!("mesh of quadrilaterals, {basis}, 16 steps");
             pairs(&name, "doughnut-10", &[&MESH[..], &[&basis]].concat());
         }
+    }
+    if wanted("dense") {
+        let dense = [
+            "output.every=16",
+            "grid.generate.annulus.radial=40",
+            "grid.generate.annulus.around=320",
+            "analysis.steps=16",
+            "body.0.points_per_cell=[4,4]",
+            "method.basis=\"cpdi2\"",
+        ];
+        pairs("mesh of quadrilaterals, cpdi2, 4 x 4 points, 16 steps", "doughnut-10", &dense);
     }
     if wanted("memory") {
         memory();
