@@ -16,7 +16,7 @@
 //! | rigid motions of every piece held? | `support.rs`, `pieces.rs` | |
 //! | locate, map and number: the grid side of a step | `discretise.rs` (`grid/locate.rs`) | Ghost Figure 1 a-c |
 //! | assemble and solve, with the papers' bookkeeping | `equilibrium.rs`, `linear_terms.rs` | Lagrangian eq. 26-30, 40 |
-//! | Newton's method for a step | `newton.rs` | |
+//! | Newton's method for a step | `newton.rs`, `convergence.rs` | |
 //! | default linear solvers | `solver.rs` | |
 //! | update: points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
 //! | back to a step's start where it fails | `snapshot.rs` | |
@@ -34,6 +34,7 @@ pub mod balance;
 pub mod checkpointing;
 pub mod clock;
 pub mod conditioning;
+mod convergence;
 pub mod discretise;
 pub mod driver;
 pub mod equilibrium;

@@ -69,7 +69,7 @@ impl<T> Default for Former<T> {
 impl<T: Copy> Former<T> {
     /// Sets `now` aside. An array of the same length takes its place, with values of no meaning.
     pub fn set_aside(&mut self, now: &mut Vec<T>) {
-        debug_assert!(!self.wanted, "an array is overwritten once a step");
+        assert!(!self.wanted, "an array is overwritten once a step");
         if self.values.capacity() < now.capacity() {
             self.values = Vec::with_capacity(now.capacity());
         }
@@ -84,14 +84,14 @@ impl<T: Copy> Former<T> {
 
     /// Sets `now` aside and puts `next` in its place.
     pub fn replace(&mut self, now: &mut Vec<T>, next: Vec<T>) {
-        debug_assert!(!self.wanted, "an array is overwritten once a step");
+        assert!(!self.wanted, "an array is overwritten once a step");
         self.values = std::mem::replace(now, next);
         self.wanted = true;
     }
 
     /// Copies `now`, for updates that overwrite it in parts.
     pub fn copy(&mut self, now: &[T]) {
-        debug_assert!(!self.wanted, "an array is overwritten once a step");
+        assert!(!self.wanted, "an array is overwritten once a step");
         self.values.clear();
         self.values.extend_from_slice(now);
         self.wanted = true;

@@ -20,11 +20,11 @@ fn pulled(duration: f64, metres: f64) -> Run {
 /// caught by moving nodes take twice the energy that they keep.
 #[test]
 fn a_boundary_that_starts_to_move_makes_no_energy() {
-    for (update, velocity, mass, ranks, least) in [
-        ("musl", "\"flip\"", "consistent", 1, 0.8),
-        ("usl", "\"flip\"", "lumped", 2, 0.8),
-        ("usf", "0.5", "consistent", 1, 0.8),
-        ("musl", "\"pic\"", "lumped", 1, 0.5),
+    for (update, velocity, mass, ranks, kept) in [
+        ("musl", "\"flip\"", "consistent", 1, 0.8..1.2),
+        ("usl", "\"flip\"", "lumped", 2, 0.8..1.2),
+        ("usf", "0.5", "consistent", 1, 0.8..1.2),
+        ("musl", "\"pic\"", "lumped", 1, 0.5..1.0),
     ] {
         let run = pulled(0.6, 0.05)
             .ranks(ranks)
@@ -35,8 +35,7 @@ fn a_boundary_that_starts_to_move_makes_no_energy() {
         let last = |name: &str| *run.history(name).last().expect("rows");
         let (work, energy) =
             (last("work_external"), last("energy_strain") + last("energy_kinetic"));
-        let kept = energy / work;
-        assert!((least..1.2).contains(&kept), "{update} {velocity} {mass}: {energy} {work}");
+        assert!(kept.contains(&(energy / work)), "{update} {velocity} {mass}: {energy} {work}");
     }
 }
 

@@ -1,0 +1,49 @@
+//! What the errors of Newton's iterates so far, one for each evaluation of a step, tell of the next.
+
+/// Whether the next error is likely below the tolerance: by Newton's method with solves that are
+/// not exact, between a fall by the last factor once more and by its square, or by the square of
+/// the error itself. Errors above one are those of a step's start, where nothing pushes yet.
+/// (docs/performance.md has how often that is right.)
+pub(super) fn converges_next(errors: &[f64], tolerance: f64) -> bool {
+    let [.., before, last] = errors[..] else { return false };
+    let factor = (last / before.min(1.0)).min(1.0);
+    last * factor.powf(1.5) <= tolerance || 10.0 * last * last <= tolerance
+}
+
+/// The last three errors are not below half of the least before them.
+pub(super) fn no_longer_falls(errors: &[f64]) -> bool {
+    let Some((before, last)) = errors.split_last_chunk::<3>() else { return false };
+    let least = |errors: &[f64]| errors.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    !before.is_empty() && last.iter().all(|e| e.is_finite()) && least(last) > 0.5 * least(before)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_error_is_foreseen() {
+        // Nothing is known after the first, and little after the second.
+        assert!(!converges_next(&[1e-3], 1e-6));
+        assert!(!converges_next(&[1e21, 1.1e-2], 1e-8));
+        assert!(!converges_next(&[0.9, 1.1e-2], 1e-8));
+        // The doughnut's falls: 1e21, 1e-2, 3e-5, 2e-10.
+        assert!(converges_next(&[1e21, 1.1e-2, 2.6e-5], 1e-8));
+        // Plastic steps fall by a factor.
+        assert!(!converges_next(&[1.0, 1e-1, 1e-2, 1e-3], 1e-6));
+        assert!(converges_next(&[1.0, 1e-1, 1e-2, 1e-3, 1e-4, 1e-5], 1e-6));
+        // A linear problem's second error is its last.
+        assert!(converges_next(&[1.0, 1e-12], 1e-9));
+    }
+
+    #[test]
+    fn errors_that_no_longer_fall() {
+        assert!(no_longer_falls(&[1.0, 1e-3, 2e-9, 3e-9, 1.1e-9, 4e-9]));
+        // Still on the way, by large steps or small ones.
+        assert!(!no_longer_falls(&[1.0, 1e-3, 1e-7, 2e-14]));
+        assert!(!no_longer_falls(&[1.0, 0.7, 0.5, 0.4, 0.3, 0.2]));
+        // Too few, or not numbers.
+        assert!(!no_longer_falls(&[1e-9, 1e-9, 1e-9]));
+        assert!(!no_longer_falls(&[1e-9, 1e-9, 1e-9, f64::NAN]));
+    }
+}
