@@ -6,11 +6,15 @@
 //! | step or section | module |
 //! |---|---|
 //! | command line, exit codes | [`cli`], [`error`] |
-//! | `input.toml` | [`deck`] |
-//! | load steps, time steps (Ghost §2.3, 2.4; Lagrangian §6.3, 6.5) | [`analysis`] |
-//! | results | [`output`] |
-//! | (d) multigrid's levels | [`multigrid`] |
-//! | (b, c) points to grid, system of equations (Lagrangian eq. 27-29) | [`assembly`] |
+//! | a run from command line to exit code | [`run`] |
+//! | the algorithms: load steps, time steps, Newton's method (Ghost §2.3, 2.4; Lagrangian §6.3, 6.5) | [`analysis`] |
+//! | what a run tells | [`record`] |
+//! | results on disk and on the terminal | [`output`] |
+//! | a step's equations (Lagrangian eq. 27-29) | [`system`] |
+//! | external forces | [`loads`] |
+//! | points to nodes and back (Ghost eq. 6, 8-10; Lagrangian eq. 31-39) | [`transfer`] |
+//! | mass of the nodes and its solve (Ghost eq. 7, 15, 24) | [`mass`] |
+//! | (d) multigrid's levels | [`amg`] |
 //! | Ghost faces and their matrix (Ghost §3, §4) | [`ghost`] |
 //! | who owns what, migration | [`parallel`] |
 //! | strains, stress measures and tangents in three frames (Lagrangian §3-5, App. A) | [`mechanics`] |
@@ -20,20 +24,26 @@
 //! | background lattice or mesh | [`grid`] |
 //! | (d) solvers | [`petsc`] |
 //! | small tensors | [`tensor`] |
+//! | `input.toml` | [`deck`] |
 
+pub mod amg;
 pub mod analysis;
-pub mod assembly;
 pub mod basis;
 pub mod cli;
 pub mod deck;
 pub mod error;
 pub mod ghost;
 pub mod grid;
+pub mod loads;
+pub mod mass;
 pub mod material;
 pub mod mechanics;
-pub mod multigrid;
 pub mod output;
 pub mod parallel;
 pub mod petsc;
 pub mod points;
+pub mod record;
+pub mod run;
+pub mod system;
 pub mod tensor;
+pub mod transfer;

@@ -8,13 +8,8 @@ use std::path::Path;
 use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
-use mpm_par::analysis::discretise::{Discretisation, Model};
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
-use mpm_par::analysis::linear_terms::ghost_matrix;
-use mpm_par::analysis::{setup, solver};
-use mpm_par::assembly::conditions::{Conditions, StepSpan};
-use mpm_par::assembly::internal;
-use mpm_par::assembly::{BlockMatrix, plain, scatter};
+use mpm_par::analysis::solver;
 use mpm_par::deck;
 use mpm_par::deck::model::Frame;
 use mpm_par::error::Result;
@@ -22,6 +17,13 @@ use mpm_par::parallel::{World, migrate};
 use mpm_par::petsc::Session;
 use mpm_par::petsc::snes::NewtonProblem;
 use mpm_par::points::Points;
+use mpm_par::run::setup;
+use mpm_par::system::conditions::{Conditions, StepSpan};
+use mpm_par::system::plain;
+use mpm_par::system::scatter::{self, BlockMatrix};
+use mpm_par::system::step_system::{Discretisation, Model};
+use mpm_par::system::terms::linear::ghost_matrix;
+use mpm_par::system::terms::stress;
 
 /// A block of material whose points lie off the middles of the cells, `per_cell` of them a side.
 fn deck_text(dimension: usize, basis: &str, per_cell: usize, plastic: bool) -> String {
@@ -101,7 +103,7 @@ fn compare<const D: usize>(
         let (mut fast, mut slow) = (zeros.clone(), zeros);
         let mut tiled = BlockMatrix::<D>::zeros(&mesh.pattern);
         let mut formulas = tiled.clone();
-        let health = internal::assemble(
+        let health = stress::assemble(
             step,
             frame,
             numbering,
@@ -125,7 +127,7 @@ fn compare<const D: usize>(
         // Bit by bit the same on a repeat, with or without the tangent.
         let mut again = vec![0.0; numbering.len() * D];
         let none = None::<&mut BlockMatrix<D>>;
-        internal::assemble(step, frame, numbering, &mesh.pattern, &displacement, &mut again, none);
+        stress::assemble(step, frame, numbering, &mesh.pattern, &displacement, &mut again, none);
         assert_eq!(again, fast);
         // A rigid translation costs nothing: each row of K sums to zero over the columns.
         tiled.reduce(world, &mesh.pattern);

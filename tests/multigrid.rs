@@ -6,8 +6,9 @@ mod common;
 use common::on_ranks;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
+use mpm_par::amg;
+use mpm_par::amg::level::{BlockRows, Nodes};
 use mpm_par::error::Result;
-use mpm_par::multigrid::{self, BlockRows, Nodes};
 use mpm_par::parallel::{HaloPlan, World};
 use mpm_par::petsc::{
     BlockProduct, CoarsestRows, Hierarchy, Matrix, NewtonProblem, Session, Snes, Verdict,
@@ -160,8 +161,8 @@ fn gradient<const D: usize>(corner: [usize; D], x: [f64; D]) -> [f64; D] {
 
 fn build<const D: usize>(world: &World, share: &Share<D>) -> Hierarchy {
     let made = match D {
-        2 => multigrid::build::<D, 3>(world, &share.nodes, &share.rows),
-        _ => multigrid::build::<D, 6>(world, &share.nodes, &share.rows),
+        2 => amg::build::<D, 3>(world, &share.nodes, &share.rows),
+        _ => amg::build::<D, 6>(world, &share.nodes, &share.rows),
     };
     made.unwrap().expect("the nodes are coupled")
 }
@@ -446,14 +447,14 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
         self.made[0] += 1;
         let rows = self.of_matrix(matrix)?;
         match D {
-            2 => multigrid::build::<D, 3>(self.world, &self.share.nodes, &rows),
-            _ => multigrid::build::<D, 6>(self.world, &self.share.nodes, &rows),
+            2 => amg::build::<D, 3>(self.world, &self.share.nodes, &rows),
+            _ => amg::build::<D, 6>(self.world, &self.share.nodes, &rows),
         }
     }
 
     fn fill(&mut self, matrix: &mut Matrix, exact: &mut BlockProduct<f64>) -> Result<()> {
         self.made[1] += 1;
-        multigrid::fill::<_, D>(&self.of_matrix(matrix)?, exact);
+        amg::fill::<_, D>(&self.of_matrix(matrix)?, exact);
         Ok(())
     }
 }

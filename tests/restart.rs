@@ -10,7 +10,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use common::mpirun;
-use mpm_par::output::seal::Checksum;
+use mpm_par::output::restart::seal::Checksum;
 use program::*;
 
 const RANKS: [usize; 4] = [1, 2, 3, 4];

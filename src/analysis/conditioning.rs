@@ -2,27 +2,29 @@
 //! velocity (Ghost §2.6, 3.5, 5.1.1) while the bodies move rigidly through the grid. Nothing is
 //! solved for; points keep their shape and carry no stress.
 
-use crate::assembly::conditions::{Conditions, StepSpan};
-use crate::assembly::inverse::MassInverse;
-use crate::assembly::{BlockMatrix, internal, mass, scatter};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
-use crate::output::RunState;
-use crate::output::history::{Conditioning, HistoryRow};
+use crate::mass::inverse::MassInverse;
+use crate::mass::matrix;
+use crate::output::restart::run_state::RunState;
+use crate::output::tables::history::{Conditioning, HistoryRow};
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::scatter::{self, BlockMatrix};
+use crate::system::terms::stress;
 
-use super::balance;
-use super::clock::Clock;
-use super::discretise::{Coupling, Discretisation, Model};
 use super::extremes::{Extremes, Reduced};
-use super::linear_terms::ghost_matrix;
-use super::mapping;
-use super::reactions::reactions;
-use super::recorder::{Ending, Recorder};
-use super::stepping::Moment;
+use super::load_steps::Moment;
+use crate::parallel::balance;
+use crate::record::clock::Clock;
+use crate::record::reactions::reactions;
+use crate::record::recorder::{Ending, Recorder};
+use crate::system::step_system::{Coupling, Discretisation, Model};
+use crate::system::terms::linear::ghost_matrix;
+use crate::transfer::mapping;
 
 /// Moves the bodies in equal increments and records one row for each position.
 pub fn run<const D: usize>(
@@ -127,19 +129,19 @@ impl<const D: usize> System<D> {
     ) -> Result<Self> {
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let step = mesh.step_points(points, &model.materials);
-        let mass = mass::consistent(world, step, pattern)?;
+        let mass = matrix::consistent(world, step, pattern)?;
         let mut mass_ghost = mass.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.mass)? {
             add(&mut mass_ghost.values, &share.values);
         }
-        let mut lumped = mass::lumped(step, numbering.len());
+        let mut lumped = matrix::lumped(step, numbering.len());
         numbering.halo.reverse_add(world, &mut lumped, 1)?;
 
         // The tangent of unstrained points is the small-strain stiffness, in any frame.
         let mut stiffness = BlockMatrix::zeros(pattern);
         let still = vec![0.0; numbering.len() * D];
         let mut force = still.clone();
-        internal::assemble(
+        stress::assemble(
             step,
             Frame::Previous,
             numbering,
@@ -251,7 +253,7 @@ impl<const D: usize> System<D> {
         grid: &Grid<D>,
         mesh: &Discretisation<D>,
         matrix: &BlockMatrix<1>,
-        step: internal::StepPoints<'_, D>,
+        step: stress::StepPoints<'_, D>,
     ) -> Result<f64> {
         let numbering = &mesh.numbering;
         let free = vec![false; numbering.len() * D];

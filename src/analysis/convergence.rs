@@ -4,14 +4,14 @@
 /// not exact, between a fall by the last factor once more and by its square, or by the square of
 /// the error itself. Errors above one are those of a step's start, where nothing pushes yet.
 /// (docs/performance.md has how often that is right.)
-pub(super) fn converges_next(errors: &[f64], tolerance: f64) -> bool {
+pub(crate) fn converges_next(errors: &[f64], tolerance: f64) -> bool {
     let [.., before, last] = errors[..] else { return false };
     let factor = (last / before.min(1.0)).min(1.0);
     last * factor.powf(1.5) <= tolerance || 10.0 * last * last <= tolerance
 }
 
 /// The last three errors are not below half of the least before them.
-pub(super) fn no_longer_falls(errors: &[f64]) -> bool {
+pub(crate) fn no_longer_falls(errors: &[f64]) -> bool {
     let Some((before, last)) = errors.split_last_chunk::<3>() else { return false };
     let least = |errors: &[f64]| errors.iter().fold(f64::INFINITY, |a, &b| a.min(b));
     !before.is_empty() && last.iter().all(|e| e.is_finite()) && least(last) > 0.5 * least(before)

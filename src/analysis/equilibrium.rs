@@ -6,25 +6,27 @@
 
 use std::time::Instant;
 
-use crate::assembly::conditions::Conditions;
-use crate::assembly::held::Held;
-use crate::assembly::in_place::{InPlace, Layout};
-use crate::assembly::internal::{self, Health, StepPoints};
-use crate::assembly::scatter::{self, BlockRows};
-use crate::assembly::{Numbering, Pattern};
+use crate::amg;
+use crate::amg::level::Assembled;
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
 use crate::grid::Grid;
-use crate::multigrid::{self, Assembled};
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::{NewtonProblem, Verdict};
 use crate::petsc::{BlockProduct, Hierarchy};
 use crate::points::Points;
+use crate::system::conditions::Conditions;
+use crate::system::held::Held;
+use crate::system::in_place::{InPlace, Layout};
+use crate::system::numbering::Numbering;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::{self, BlockRows};
+use crate::system::terms::stress::{self, Health, StepPoints};
 
 use super::convergence::{converges_next, no_longer_falls};
-use super::discretise::Discretisation;
-use super::linear_terms::{GhostTerm, Inertia};
+use crate::system::step_system::Discretisation;
+use crate::system::terms::linear::{GhostTerm, Inertia};
 
 /// Limits and choices of the iteration.
 #[derive(Debug, Clone, Copy)]
@@ -232,7 +234,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let (world, pattern, step) = (self.world, self.pattern, self.step);
         let (frame, displacement) = (self.settings.frame, &self.displacement[..]);
         let add = |groups: &[_], force: &mut [f64], rows: Option<&mut InPlace<'_, D>>| {
-            internal::assemble_groups(step, groups, frame, pattern, displacement, force, rows)
+            stress::assemble_groups(step, groups, frame, pattern, displacement, force, rows)
         };
         // What other ranks wait for comes first, and travels while the rest is added up.
         let reaching = add(&step.border.reaching, &mut force, rows.as_mut());
@@ -429,14 +431,12 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
-        self.with_rows(matrix, |rows| {
-            multigrid::of_system(self.world, self.grid, self.numbering, rows)
-        })
+        self.with_rows(matrix, |rows| amg::of_system(self.world, self.grid, self.numbering, rows))
     }
 
     fn fill(&mut self, matrix: &mut Matrix, exact: &mut BlockProduct<f64>) -> Result<()> {
         self.with_rows(matrix, |rows| {
-            multigrid::fill::<_, D>(rows, exact);
+            amg::fill::<_, D>(rows, exact);
             Ok(())
         })
     }

@@ -2,21 +2,21 @@
 
 use crate::deck::model::Mass;
 use crate::error::{Error, Result};
-use crate::output::RunState;
+use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::points::Points;
 
-use super::clock::Clock;
-use super::discretise::Model;
 use super::explicit_nodes::Halt;
 use super::explicit_step::advance;
-use super::ledger::{Entry, Ledger, StepSums};
-use super::recorder::{Ending, Recorder};
-use super::snapshot::Snapshot;
+use super::load_steps::Moment;
 use super::step_end::{self, End};
-use super::stepping::Moment;
-use super::time_step::{TimeSteps, stability_limit};
-use super::update;
+use super::time_steps::{TimeSteps, stability_limit};
+use crate::record::clock::Clock;
+use crate::record::ledger::{Entry, Ledger, StepSums};
+use crate::record::recorder::{Ending, Recorder};
+use crate::system::step_system::Model;
+use crate::transfer::undo::Snapshot;
+use crate::transfer::update;
 
 /// Runs all time steps and writes everything a run leaves.
 pub fn run<const D: usize>(

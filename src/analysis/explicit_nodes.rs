@@ -3,26 +3,26 @@
 
 use std::time::Instant;
 
-use crate::assembly::conditions::Conditions;
-use crate::assembly::internal::StepPoints;
 use crate::deck::model::StressUpdate;
 use crate::error::{Error, Result};
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::system::conditions::Conditions;
+use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 
-use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
-use super::grid_mass::{GridMass, Inverse, require_mass};
-use super::mapping::{self, Pushed};
-use super::nodal_sums::{over_points, to_points};
-use super::snapshot::Snapshot;
-use super::transport::Carrier;
-use super::update::{self, PointEnergies, Refusal};
+use crate::mass::grid_mass::{GridMass, Inverse, require_mass};
+use crate::record::clock::Clock;
+use crate::system::step_system::{Discretisation, Model};
+use crate::transfer::mapping::{self, Pushed};
+use crate::transfer::nodal_sums::{over_points, to_points};
+use crate::transfer::transport::Carrier;
+use crate::transfer::undo::Snapshot;
+use crate::transfer::update::{self, PointEnergies, Refusal};
 
 /// Why a step has no end.
-pub(super) enum Halt {
+pub(crate) enum Halt {
     /// Its increments cannot be applied.
     Refused(Refusal),
     Failed(Error),
@@ -41,7 +41,7 @@ impl From<Refusal> for Halt {
 }
 
 /// A step's equations at the nodes.
-pub(super) struct Nodes<'a, const D: usize> {
+pub(crate) struct Nodes<'a, const D: usize> {
     world: &'a World,
     model: &'a Model<D>,
     mesh: &'a Discretisation<D>,
@@ -62,13 +62,13 @@ pub(super) struct Nodes<'a, const D: usize> {
 }
 
 /// Nodal force with the shares of all ranks, N, and acceleration, m/s2; at ghosts without meaning.
-pub(super) struct Forces<const D: usize> {
+pub(crate) struct Forces<const D: usize> {
     pub pushed: Vec<[f64; D]>,
     pub acceleration: Vec<f64>,
 }
 
 /// Nodal increments, m.
-pub(super) struct Motion {
+pub(crate) struct Motion {
     /// They move the points.
     pub moved: Vec<f64>,
     /// With musl, they deform them; else the step's own increments do.
@@ -221,7 +221,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         Ok((deformation, energies))
     }
 
-    /// dt w with w of [`super::transport`], and with musl dt times the velocity of the updated
+    /// dt w with w of [`crate::transfer::transport`], and with musl dt times the velocity of the updated
     /// points. Collective.
     pub fn motion(
         &mut self,

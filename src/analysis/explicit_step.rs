@@ -1,33 +1,33 @@
 //! v = M~^-1 Σ m S^T v_p, a = M~^-1 (f_ext - f_int), v_p += dt S a, x_p += dt S w with w near
-//! v' = v + dt a (Ghost §2.3, eq. 4-11; w: [`super::transport`]): one explicit step, stress updated
+//! v' = v + dt a (Ghost §2.3, eq. 4-11; w: [`crate::transfer::transport`]): one explicit step, stress updated
 //! first, last, or last with the velocity mapped once more.
 
-use crate::assembly::conditions::{Conditions, StepSpan};
-use crate::assembly::internal::StepPoints;
 use crate::deck::model::{Basis, Mass, StressUpdate};
 use crate::error::Error;
-use crate::output::history::HistoryRow;
+use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 use crate::tensor::dense::identity;
 
-use super::clock::Clock;
-use super::discretise::{Coupling, Discretisation, Model};
 use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
-use super::grid_mass::GridMass;
-use super::ledger::StepSums;
-use super::mapping::{self, Pushed};
-use super::reactions::{at_held, reactions};
-use super::snapshot::Snapshot;
 use super::step_end::Solved;
-use super::transport::{self, Carrier};
-use super::update::{self, Increments};
+use crate::mass::grid_mass::GridMass;
+use crate::record::clock::Clock;
+use crate::record::ledger::StepSums;
+use crate::record::reactions::{at_held, reactions};
+use crate::system::step_system::{Coupling, Discretisation, Model};
+use crate::transfer::mapping::{self, Pushed};
+use crate::transfer::transport::{self, Carrier};
+use crate::transfer::undo::Snapshot;
+use crate::transfer::update::{self, Increments};
 
 /// One time step; the points end at their new state, not yet migrated, and `before` holds what was
 /// overwritten so far, after a failure too. The row lacks the ledger's columns. Collective.
-pub(super) fn advance<const D: usize>(
+pub(crate) fn advance<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &mut Points<D>,

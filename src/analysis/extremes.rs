@@ -9,11 +9,13 @@
 
 use nalgebra::DMatrix;
 
-use crate::assembly::inverse::MassInverse;
-use crate::assembly::{BlockMatrix, Numbering, Pattern};
 use crate::error::Result;
+use crate::mass::inverse::MassInverse;
 use crate::parallel::World;
 use crate::petsc::{Ksp, Matrix};
+use crate::system::numbering::Numbering;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockMatrix;
 
 /// Degrees of freedom up to which all eigenvalues are computed.
 pub const DENSE_UP_TO: usize = 1500;

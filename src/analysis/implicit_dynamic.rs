@@ -5,32 +5,33 @@
 //! Velocity and acceleration come from the points by Ghost eq. 10 and return as increments
 //! (velocity, by the deck's FLIP share) and values (acceleration).
 
-use crate::assembly::conditions::{Conditions, StepSpan};
-use crate::assembly::internal::StepPoints;
 use crate::error::{Error, Result};
-use crate::output::RunState;
-use crate::output::history::HistoryRow;
+use crate::output::restart::run_state::RunState;
+use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::terms::stress::StepPoints;
 
-use super::clock::Clock;
-use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
-use super::grid_mass::{GridMass, Inverse};
-use super::ledger::{Entry, Ledger, StepSums};
-use super::linear_terms::Inertia;
+use super::load_steps::Stepping;
 use super::newmark::{Newmark, PointRates, Rates};
 use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
-use super::reactions::{at_held, reactions};
-use super::recorder::{Ending, Recorder};
-use super::snapshot::Snapshot;
 use super::solver::Trials;
 use super::step_end::{End, Solved};
-use super::stepping::Stepping;
-use super::time_step::stability_limit;
-use super::{mapping, newton, step_end, update};
+use super::time_steps::stability_limit;
+use super::{newton, step_end};
+use crate::mass::grid_mass::{GridMass, Inverse};
+use crate::record::clock::Clock;
+use crate::record::ledger::{Entry, Ledger, StepSums};
+use crate::record::reactions::{at_held, reactions};
+use crate::record::recorder::{Ending, Recorder};
+use crate::system::step_system::{Coupling, Discretisation, Model};
+use crate::system::terms::linear::Inertia;
+use crate::transfer::undo::Snapshot;
+use crate::transfer::{mapping, update};
 
 /// Runs all time steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.

@@ -1,11 +1,11 @@
 //! a' = u/(β dt²) - v/(β dt) - (1/(2β) - 1) a, v' = v + dt ((1 - γ) a + γ a'): Newmark's family, and
 //! with α the dissipative one of Hilber, Hughes and Taylor.
 
-use crate::assembly::internal::StepPoints;
 use crate::deck::model::Analysis;
 use crate::points::Points;
+use crate::system::terms::stress::StepPoints;
 
-use super::mapping;
+use crate::transfer::mapping;
 
 /// The method's numbers for a step of `dt`.
 #[derive(Debug, Clone, Copy)]

@@ -1,7 +1,6 @@
 //! One step's equations handed to Newton's method, and what comes back: the part that implicit
 //! analyses share.
 
-use crate::assembly::conditions::StepSpan;
 use crate::deck::model::Basis;
 use crate::error::Result;
 use crate::grid::Grid;
@@ -10,14 +9,15 @@ use crate::petsc::log::Phase;
 use crate::petsc::snes::NewtonOutcome;
 use crate::petsc::{Matrix, Vector};
 use crate::points::Points;
+use crate::system::conditions::StepSpan;
 
-use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
 use super::equilibrium::{Equilibrium, NewtonSettings};
-use super::motion;
-use super::recorder::Recorder;
 use super::solver::{self, Linear, Trials};
-use super::update::{self, Increments};
+use crate::record::clock::Clock;
+use crate::record::recorder::Recorder;
+use crate::system::step_system::{Discretisation, Model};
+use crate::transfer::mesh_motion;
+use crate::transfer::update::{self, Increments};
 
 /// A converged step. Vectors without other mention hold the owned degrees of freedom.
 pub struct Converged {
@@ -126,7 +126,7 @@ pub fn carried<const D: usize>(
 ) -> Result<std::result::Result<Carried<D>, String>> {
     let (deck, grid, numbering) = (&model.deck, &model.grid, &mesh.numbering);
     let mut made = update::increments(mesh.step_points(points, &model.materials), displacement);
-    let moved_grid = match motion::moved(world, deck, grid, numbering, displacement, span)? {
+    let moved_grid = match mesh_motion::moved(world, deck, grid, numbering, displacement, span)? {
         Ok(moved_grid) => moved_grid,
         Err(why) => return Ok(Err(why)),
     };

@@ -1,27 +1,29 @@
 //! Implicit quasi-static analysis (Lagrangian §6.3-6.5, Ghost §2.4): locate, map, number,
 //! {assemble, solve}*, update, migrate, write.
 
-use crate::assembly::Numbering;
-use crate::assembly::conditions::{Conditions, StepSpan};
-use crate::assembly::external::map_forces;
 use crate::deck::Deck;
 use crate::error::Result;
-use crate::output::RunState;
-use crate::output::history::HistoryRow;
+use crate::loads::point_forces::map_forces;
+use crate::output::restart::run_state::RunState;
+use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::numbering::Numbering;
 
-use super::clock::Clock;
-use super::discretise::{Coupling, Discretisation, Model};
 use super::equilibrium::Equilibrium;
+use super::load_steps::Stepping;
 use super::newton::Carried;
-use super::reactions::{at_held, reactions};
-use super::recorder::{Ending, Recorder};
 use super::solver::Trials;
 use super::step_end::{End, Solved};
-use super::stepping::Stepping;
-use super::{newton, step_end, update, verify};
+use super::{newton, step_end};
+use crate::record::clock::Clock;
+use crate::record::reactions::{at_held, reactions};
+use crate::record::recorder::{Ending, Recorder};
+use crate::record::verify;
+use crate::system::step_system::{Coupling, Discretisation, Model};
+use crate::transfer::update;
 
 /// Runs all load steps and writes everything a run leaves. A step that cannot be finished ends
 /// the run as `on_failure` says; what was written before stays.

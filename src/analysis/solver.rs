@@ -7,18 +7,20 @@
 //! direct solver sums in the order in which messages arrive; on one rank it repeats bit by bit, and
 //! is faster at these sizes too.
 
-use crate::assembly::{Numbering, Pattern, inverse};
 use crate::deck::model::AnalysisType;
 use crate::error::Result;
 use crate::grid::Grid;
-use crate::output::RunState;
+use crate::mass::inverse;
+use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
 use crate::petsc::{Rehearsal, options};
+use crate::system::numbering::Numbering;
+use crate::system::pattern::Pattern;
 
-use super::discretise::Model;
 use super::extremes;
+use crate::system::step_system::Model;
 
 /// Equations up to which the direct solver is the default in 2D and 3D: multigrid is faster from
 /// about a thousand on, but small studies like their residuals exact.

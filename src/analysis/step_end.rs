@@ -4,17 +4,17 @@
 
 use crate::error::Result;
 use crate::grid::Grid;
-use crate::output::RunState;
-use crate::output::history::HistoryRow;
+use crate::output::restart::run_state::RunState;
+use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 
-use super::balance;
-use super::clock::Clock;
-use super::discretise::{Discretisation, Model};
-use super::recorder::{Ending, Recorder};
-use super::stepping::Moment;
+use super::load_steps::Moment;
+use crate::parallel::balance;
+use crate::record::clock::Clock;
+use crate::record::recorder::{Ending, Recorder};
+use crate::system::step_system::{Discretisation, Model};
 
 /// A solved step: its row, and the grid as it was solved.
 pub struct Solved<const D: usize> {

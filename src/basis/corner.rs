@@ -46,7 +46,7 @@ impl<const D: usize> Corners<D> {
 /// Appends the cells that hold the corners of a domain of point `p`, ascending.
 ///
 /// Error: a corner beyond reach.
-pub(super) fn populated_cells<const D: usize>(
+pub(crate) fn populated_cells<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,
@@ -65,7 +65,7 @@ pub(super) fn populated_cells<const D: usize>(
 /// that of the last.
 ///
 /// Error: a corner beyond reach, named by point, corner and position.
-pub(super) fn for_each_place<const D: usize>(
+pub(crate) fn for_each_place<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,

@@ -12,9 +12,10 @@
 //! map the diagonals exactly, and the area is half their cross product. Rotation's v_p is
 //! therefore [`Points::volume`]; in 3D the two differ at second order in the hexahedron's warp.
 
+use crate::deck::model::Element;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
-use crate::grid::element::{Element, determinant, inverse, jacobian};
+use crate::grid::element::{determinant, inverse, jacobian};
 use crate::grid::quadrature::gauss_rule;
 use crate::points::Points;
 

@@ -26,7 +26,7 @@ const SMALLEST_REACH: f64 = 1e-13;
 
 /// The first and last cell overlapped along one axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Span {
+pub(crate) struct Span {
     pub first: usize,
     pub last: usize,
 }
@@ -46,7 +46,7 @@ impl Span {
 
 /// The cells overlapped by the domain of point `p`, per axis.
 #[inline]
-pub(super) fn spans<const D: usize>(
+pub(crate) fn spans<const D: usize>(
     grid: &Grid<D>,
     lattice: &Lattice<D>,
     points: &Points<D>,
@@ -76,7 +76,7 @@ pub(super) fn spans<const D: usize>(
     Ok(spans)
 }
 
-pub(super) fn map_points<const D: usize>(
+pub(crate) fn map_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
@@ -96,7 +96,7 @@ pub(super) fn map_points<const D: usize>(
     Ok(influences)
 }
 
-pub(super) fn populated_cells<const D: usize>(
+pub(crate) fn populated_cells<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,

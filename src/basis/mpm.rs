@@ -9,7 +9,7 @@ use crate::grid::locate::REACH;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
-pub(super) fn map_points<const D: usize>(
+pub(crate) fn map_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
@@ -71,7 +71,7 @@ fn map_points_on_mesh<const D: usize>(grid: &Grid<D>, points: &Points<D>) -> Res
     })
 }
 
-pub(super) fn populated_cells<const D: usize>(
+pub(crate) fn populated_cells<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,

@@ -7,7 +7,7 @@ use crate::grid::Lattice;
 
 /// Functions of consecutive nodes along one axis, from node `first` on.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Line {
+pub(crate) struct Line {
     pub first: usize,
     pub weights: Vec<f64>,
     /// 1/m
@@ -28,7 +28,7 @@ impl Line {
 
 /// Pushes a row with the product of the lines, nodes ascending.
 #[inline]
-pub(super) fn push_row<const D: usize>(
+pub(crate) fn push_row<const D: usize>(
     lattice: &Lattice<D>,
     lines: &[Line; D],
     influences: &mut Influences<D>,
@@ -71,7 +71,7 @@ fn strides<const D: usize>(counts: [usize; D]) -> [usize; D] {
 
 /// Calls `visit` with every index below `counts`, first axis fastest.
 #[inline]
-pub(super) fn for_each_index<const D: usize>(
+pub(crate) fn for_each_index<const D: usize>(
     counts: &[usize; D],
     mut visit: impl FnMut([usize; D]),
 ) {

@@ -66,7 +66,7 @@ impl<const D: usize> Row<D> {
 }
 
 /// Influences of all points, each row made by `fill` (which replaces the row it is given).
-pub(super) fn map_points<const D: usize>(
+pub(crate) fn map_points<const D: usize>(
     points: &Points<D>,
     mut fill: impl FnMut(usize, &mut Row<D>) -> Result<()>,
 ) -> Result<Influences<D>> {
@@ -84,7 +84,7 @@ pub(super) fn map_points<const D: usize>(
 }
 
 /// Sorts what was appended after `start`, each value once.
-pub(super) fn sort_tail(values: &mut Vec<usize>, start: usize) {
+pub(crate) fn sort_tail(values: &mut Vec<usize>, start: usize) {
     values[start..].sort_unstable();
     let mut kept = start;
     for i in start..values.len() {

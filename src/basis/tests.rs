@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
-pub(super) fn lattice<const D: usize>() -> Lattice<D> {
+pub(crate) fn lattice<const D: usize>() -> Lattice<D> {
     Lattice {
         origin: std::array::from_fn(|a| [-0.3, 0.7, 0.1][a]),
         spacing: std::array::from_fn(|a| [0.1, 0.3, 0.7][a]),
@@ -19,7 +19,7 @@ pub(super) fn lattice<const D: usize>() -> Lattice<D> {
 }
 
 /// Points at grid coordinates `t` (in cells) with half lengths `reach` (in cells).
-pub(super) fn points_at<const D: usize>(places: &[([f64; D], [f64; D])]) -> Points<D> {
+pub(crate) fn points_at<const D: usize>(places: &[([f64; D], [f64; D])]) -> Points<D> {
     let grid = lattice::<D>();
     let mut points = Points::default();
     for (id, (t, reach)) in places.iter().enumerate() {

@@ -20,7 +20,7 @@ impl PartialEq for Places {
 
 impl Places {
     /// Of all keys below `root`; `mark` tells the begin and the end of a message.
-    pub(super) fn of(root: &Node, mark: impl Fn(&Origin) -> (String, String)) -> Self {
+    pub(crate) fn of(root: &Node, mark: impl Fn(&Origin) -> (String, String)) -> Self {
         let mut places = Places { file: mark(&Origin::Nowhere).0, marks: BTreeMap::new() };
         places.enter(root, "", &mark);
         places

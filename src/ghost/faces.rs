@@ -28,7 +28,7 @@ pub struct BoundaryFace {
 
 /// What a neighbour rank must know of a cell.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Cell {
+pub(crate) struct Cell {
     /// Bodies that populate the cell, one bit each.
     pub populated: u64,
     /// Bodies for which it is a boundary cell.
@@ -45,7 +45,7 @@ impl Cell {
 }
 
 /// The cells of this rank, in their order, and those of others that are known.
-pub(super) struct Cells {
+pub(crate) struct Cells {
     first: usize,
     /// Place in `own` of the cells from `first` on; empty where they lie far apart.
     table: Vec<u32>,

@@ -19,7 +19,7 @@ use super::faces::{BoundaryFace, Cell, Cells};
 
 /// The ties whose lower cell this rank owns, in ascending order. `boundary` lists its boundary
 /// cells; `cells` knows all cells with a face at them. Collective.
-pub(super) fn ties<const D: usize>(
+pub(crate) fn ties<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,

@@ -12,10 +12,11 @@ use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
 
-use super::element::{self, Element};
+use super::element;
 use super::locate::Bins;
 use super::mesh::{Mesh, smallest_edge};
 use super::topology::{OUTSIDE, ThirdCell, Topology};
+use crate::deck::model::Element;
 
 /// Raw contents of a mesh before it is checked.
 #[derive(Debug, Clone)]
@@ -199,7 +200,7 @@ fn same_nodes(a: &[u32], b: &[u32]) -> bool {
 }
 
 /// The first cell, and its corner, where det J is not clearly positive.
-pub(super) fn first_inverted<const D: usize>(
+pub(crate) fn first_inverted<const D: usize>(
     element: Element,
     positions: &[[f64; D]],
     cells: &[u32],
@@ -210,7 +211,7 @@ pub(super) fn first_inverted<const D: usize>(
 }
 
 /// The first cell, and which of the reference `places`, where det J is not clearly positive.
-pub(super) fn first_inverted_at<const D: usize>(
+pub(crate) fn first_inverted_at<const D: usize>(
     element: Element,
     positions: &[[f64; D]],
     cells: &[u32],

@@ -6,9 +6,10 @@
 
 use crate::error::{Error, Result};
 
-use super::element::{self, Element};
+use super::element;
 use super::lattice::CELL_CORNERS;
 use super::{FacePair, Grid, Lattice, Mesh};
+use crate::deck::model::Element;
 
 /// What the face matrix needs of one interior face.
 #[derive(Debug, Clone, PartialEq)]

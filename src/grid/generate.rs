@@ -6,11 +6,11 @@ use crate::deck::model::MeshSource;
 use crate::error::{Error, Result};
 
 use super::check::Draft;
-use super::element::Element;
 use super::lattice::CELL_CORNERS;
 use super::mesh::Mesh;
 use super::quadrature::kuhn_simplices;
 use super::{Lattice, gmsh};
+use crate::deck::model::Element;
 
 /// Boundary tags of a box, lower and upper end of each axis.
 const SIDES: [[&str; 2]; 3] = [["left", "right"], ["bottom", "top"], ["back", "front"]];

@@ -12,8 +12,8 @@ use rustc_hash::FxHashMap;
 use crate::error::{Error, Result};
 
 use super::check::Draft;
-use super::element::Element;
 use super::mesh::Mesh;
+use crate::deck::model::Element;
 
 type Msh = MshFile<u64, i32, f64>;
 

@@ -1,7 +1,8 @@
 //! xi with x(xi) = x: the reference coordinates of a place in a cell.
 
-use super::element::{Element, inverse};
+use super::element::inverse;
 use super::lattice::CELL_CORNERS;
+use crate::deck::model::Element;
 
 /// The reference coordinates xi with x(xi) = `x`: direct for simplices, Newton otherwise.
 /// `None` where the iteration leaves the neighbourhood of the cell or meets a singular J;

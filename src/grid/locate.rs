@@ -4,10 +4,11 @@
 //! the point has travelled. Of several cells that hold a point (on a face, up to
 //! [`EDGE_TOLERANCE`]) the lowest-numbered one wins, so the answer is the same on every rank.
 
-use super::element::{self, Element};
+use super::element;
 use super::inverse_map::inverse_map;
 use super::mesh::Mesh;
 use super::topology::OUTSIDE;
+use crate::deck::model::Element;
 
 /// A point this far outside a cell, as a fraction of the cell's extent, still counts as inside.
 pub const EDGE_TOLERANCE: f64 = 5e-10;
@@ -21,7 +22,7 @@ const STRIDES: usize = 5;
 
 /// Cells by the bins their bounding boxes overlap, in compressed rows.
 #[derive(Debug, Clone)]
-pub(super) struct Bins<const D: usize> {
+pub(crate) struct Bins<const D: usize> {
     low: [f64; D],
     /// Bins per metre.
     scale: [f64; D],
@@ -107,7 +108,7 @@ impl<const D: usize> Bins<D> {
     }
 
     /// Cells whose boxes may hold `x`, ascending.
-    pub(super) fn candidates(&self, x: &[f64; D]) -> &[u32] {
+    pub(crate) fn candidates(&self, x: &[f64; D]) -> &[u32] {
         if x.iter().any(|x| !x.is_finite()) {
             return &[];
         }

@@ -17,10 +17,11 @@ use std::collections::BTreeMap;
 use crate::error::{Error, Result};
 
 use super::FacePair;
-use super::element::{self, Element};
+use super::element;
 use super::locate::Bins;
 use super::quadrature::{self, SubCell};
 use super::topology::{OUTSIDE, Topology};
+use crate::deck::model::Element;
 
 /// A checked mesh: see [`super::check`] for what holds.
 #[derive(Debug, Clone)]
@@ -28,19 +29,19 @@ pub struct Mesh<const D: usize> {
     /// Where it came from, for messages: a file name or "generated annulus".
     pub name: String,
     pub element: Element,
-    pub(super) positions: Vec<[f64; D]>,
-    pub(super) initial: Vec<[f64; D]>,
+    pub(crate) positions: Vec<[f64; D]>,
+    pub(crate) initial: Vec<[f64; D]>,
     /// Node numbers, `element.node_count()` per cell.
-    pub(super) cells: Vec<u32>,
-    pub(super) topology: Topology,
-    pub(super) bins: Bins<D>,
-    pub(super) node_sets: BTreeMap<String, Vec<u32>>,
-    pub(super) cell_sets: BTreeMap<String, Vec<u32>>,
+    pub(crate) cells: Vec<u32>,
+    pub(crate) topology: Topology,
+    pub(crate) bins: Bins<D>,
+    pub(crate) node_sets: BTreeMap<String, Vec<u32>>,
+    pub(crate) cell_sets: BTreeMap<String, Vec<u32>>,
     /// Smallest edge, m.
-    pub(super) size: f64,
+    pub(crate) size: f64,
     /// A cell has folded at a corner, as those of a mesh that follows the material may: cells
     /// then overlap.
-    pub(super) folded: bool,
+    pub(crate) folded: bool,
 }
 
 impl<const D: usize> Mesh<D> {
@@ -86,7 +87,7 @@ impl<const D: usize> Mesh<D> {
         self.across_raw(cell).iter().map(|&c| (c != OUTSIDE).then_some(c as usize))
     }
 
-    pub(super) fn across_raw(&self, cell: usize) -> &[u32] {
+    pub(crate) fn across_raw(&self, cell: usize) -> &[u32] {
         let faces = self.element.faces().len();
         &self.topology.neighbours[cell * faces..(cell + 1) * faces]
     }
@@ -219,14 +220,14 @@ impl<const D: usize> Mesh<D> {
     }
 
     /// What has to follow every change of positions: bins and the smallest edge.
-    pub(super) fn refresh(&mut self) {
+    pub(crate) fn refresh(&mut self) {
         self.size = smallest_edge(self.element, &self.positions, &self.cells);
         self.bins =
             Bins::new(self.element, &self.positions, &self.cells, &self.topology.neighbours);
     }
 }
 
-pub(super) fn smallest_edge<const D: usize>(
+pub(crate) fn smallest_edge<const D: usize>(
     element: Element,
     positions: &[[f64; D]],
     cells: &[u32],

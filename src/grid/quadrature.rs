@@ -6,7 +6,8 @@
 
 use std::sync::OnceLock;
 
-use super::element::{self, Element};
+use super::element;
+use crate::deck::model::Element;
 
 /// A material point's share of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,7 +99,7 @@ const ORDERS: [&[[usize; 3]]; 2] =
 
 /// Integer vertices of the simplices that fill the unit cube at `low`, one per order of axes,
 /// positively oriented.
-pub(super) fn kuhn_simplices<const D: usize>(
+pub(crate) fn kuhn_simplices<const D: usize>(
     low: [usize; D],
 ) -> impl Iterator<Item = [[usize; D]; 4]> {
     ORDERS[D - 2].iter().map(move |order| {

@@ -1,13 +1,13 @@
 //! Which cells share a face: built once from the connectivity, unchanged by motion.
 
-use super::element::Element;
+use crate::deck::model::Element;
 
 /// No cell: the neighbour across an outer face.
-pub(super) const OUTSIDE: u32 = u32::MAX;
+pub(crate) const OUTSIDE: u32 = u32::MAX;
 
 /// Per cell and face the cell across it, and per node its lowest cell.
 #[derive(Debug, Clone)]
-pub(super) struct Topology {
+pub(crate) struct Topology {
     /// `faces` entries per cell, [`OUTSIDE`] on the outer edge.
     pub neighbours: Vec<u32>,
     /// Lowest-numbered cell at each node, [`OUTSIDE`] for a node of no cell.
@@ -16,7 +16,7 @@ pub(super) struct Topology {
 
 /// A face with more than two cells (the first three), which no mesh of a region can have.
 #[derive(Debug)]
-pub(super) struct ThirdCell(pub [u32; 3]);
+pub(crate) struct ThirdCell(pub [u32; 3]);
 
 impl Topology {
     /// O(n) in the number of faces; 24 bytes per cell face and 4 per node while it runs.

@@ -12,7 +12,7 @@ use crate::tensor::spectral::logarithm_slope;
 
 /// Stress T and tangent A; `back` is H, `scale` s = V0 / V_frame.
 #[inline(always)]
-pub(super) fn pull_back<const D: usize>(
+pub(crate) fn pull_back<const D: usize>(
     update: &Update,
     back: &Square<D>,
     scale: f64,

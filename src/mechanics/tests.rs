@@ -10,18 +10,18 @@ use crate::material::{Hencky, Material, VonMises};
 use crate::tensor::dense::{self, Square};
 use crate::tensor::spectral::exponential;
 
-pub(super) const FRAMES: [Frame; 3] = [Frame::Previous, Frame::Updated, Frame::Total];
+pub(crate) const FRAMES: [Frame; 3] = [Frame::Previous, Frame::Updated, Frame::Total];
 
-pub(super) fn elastic() -> Material {
+pub(crate) fn elastic() -> Material {
     Material::Hencky(Hencky::new(100.0, 0.3))
 }
 
-pub(super) fn plastic() -> Material {
+pub(crate) fn plastic() -> Material {
     Material::VonMises(VonMises::new(Hencky::new(100.0, 0.3), 5.0))
 }
 
 /// Numbers in (-1, 1), the same on every run.
-pub(super) struct Sequence(pub u64);
+pub(crate) struct Sequence(pub u64);
 
 impl Sequence {
     pub fn next(&mut self) -> f64 {
@@ -48,7 +48,7 @@ impl Sequence {
 }
 
 /// A point at the start of a step.
-pub(super) struct Case<const D: usize> {
+pub(crate) struct Case<const D: usize> {
     pub material: Material,
     pub gradient: Matrix3<f64>,
     pub elastic: Matrix3<f64>,

@@ -9,7 +9,7 @@ use crate::tensor::Spectrum;
 use crate::tensor::dense::{self, Square};
 
 /// The constitutive update of one point, all in the principal axes of the trial strain.
-pub(super) struct Update {
+pub(crate) struct Update {
     /// Trial b_e: principal values b_a and axes; for D = 2 the last axis is z.
     pub trial: Spectrum,
     /// ln b_a
@@ -33,7 +33,7 @@ fn trial<const D: usize>(before: &Matrix3<f64>, increment: &Square<D>) -> Spectr
 }
 
 #[inline(always)]
-pub(super) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -> Update {
+pub(crate) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -> Update {
     let trial = trial(start.elastic_left_cauchy_green, increment);
     let logarithms = trial.values.map(f64::ln);
     let response = start.material.respond(logarithms.map(|e| 0.5 * e));
@@ -42,7 +42,7 @@ pub(super) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -
 
 impl Update {
     #[inline(always)]
-    pub(super) fn state(&self, material: &Material) -> StressState {
+    pub(crate) fn state(&self, material: &Material) -> StressState {
         let response = &self.response;
         StressState {
             kirchhoff_stress: self.trial.compose(response.stress),
@@ -69,7 +69,7 @@ fn elastic_values(trial: &Spectrum, response: &Response) -> [f64; 3] {
 /// in stages over all of them: roots, quotients and logarithms of one point wait for each other,
 /// those of several points do not.
 #[inline(always)]
-pub(super) fn states<'a, const D: usize>(
+pub(crate) fn states<'a, const D: usize>(
     start: impl Fn(usize) -> StepStart<'a>,
     increments: &[Square<D>],
     out: &mut [StressState],

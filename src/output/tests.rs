@@ -7,17 +7,27 @@ use std::process::{Command, Stdio};
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::agreement::{all_agree, on_root};
-use super::csv_table::Mark;
+use super::directory::ResultsDirectory;
+use super::extent;
 use super::extent::body_summaries;
-use super::history::{HistoryRow, Layout, Reaction};
-use super::*;
+use super::series::grid_file::{GridFrame, GridSeries};
+use super::series::hdf5_reader::FileReader;
+use super::series::hdf5_writer::FileWriter;
+use super::series::point_field::PointField;
+use super::series::points_file::PointsSeries;
+use super::summary::Summary;
+use super::tables::csv_table::Mark;
+use super::tables::history::History;
+use super::tables::history::{HistoryRow, Layout, Reaction};
+use super::tables::residuals::Residuals;
+use super::terminal::log::Log;
 use crate::deck::model::{Basis, Element};
 use crate::error::Error;
 use crate::points::Points;
 
 mod xdmf_reader;
 
-use xdmf_reader::read_xdmf;
+use super::tests::xdmf_reader::read_xdmf;
 
 const CASE: &str = "MPM_OUTPUT_CASE";
 const FOLDER: &str = "MPM_OUTPUT_FOLDER";

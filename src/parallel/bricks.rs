@@ -6,7 +6,7 @@ use crate::grid::Lattice;
 /// Largest brick side chosen automatically: larger ones make ragged parts and save nothing.
 const LARGEST_SIDE: usize = 16;
 /// Largest table of owners chosen automatically, units (four bytes each, on every rank).
-pub(super) const LARGEST_TABLE: usize = 4 << 20;
+pub(crate) const LARGEST_TABLE: usize = 4 << 20;
 /// Populated bricks that every rank should have, so that loads can be levelled to about 2 %.
 const BRICKS_PER_RANK: usize = 50;
 

@@ -14,6 +14,7 @@
 //! | `traffic.rs` | messages, bytes and reductions, counted |
 //! | `signals.rs` | SIGTERM and SIGUSR1 as a wish of all ranks |
 
+pub mod balance;
 pub mod bricks;
 pub mod cells;
 pub mod diffuse;

@@ -43,7 +43,7 @@ pub fn so_far() -> Traffic {
     SO_FAR.get()
 }
 
-pub(super) fn count_message(bytes: usize) {
+pub(crate) fn count_message(bytes: usize) {
     let mut traffic = SO_FAR.get();
     traffic.messages += 1;
     traffic.bytes += bytes as u64;
@@ -51,7 +51,7 @@ pub(super) fn count_message(bytes: usize) {
 }
 
 /// Runs a collective operation that is one reduction or its like.
-pub(super) fn reducing<T>(act: impl FnOnce() -> T) -> T {
+pub(crate) fn reducing<T>(act: impl FnOnce() -> T) -> T {
     let outcome = waiting(act);
     let mut traffic = SO_FAR.get();
     traffic.reductions += 1;
@@ -60,7 +60,7 @@ pub(super) fn reducing<T>(act: impl FnOnce() -> T) -> T {
 }
 
 /// Runs a piece of communication on the clock.
-pub(super) fn waiting<T>(act: impl FnOnce() -> T) -> T {
+pub(crate) fn waiting<T>(act: impl FnOnce() -> T) -> T {
     let begin = Instant::now();
     let outcome = act();
     let mut traffic = SO_FAR.get();

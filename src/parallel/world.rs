@@ -38,7 +38,7 @@ impl World {
     }
 
     /// A tag for the next sparse exchange; the same on all ranks, as exchanges are collective.
-    pub(super) fn next_tag(&self) -> i32 {
+    pub(crate) fn next_tag(&self) -> i32 {
         let count = self.exchanges.get();
         self.exchanges.set((count + 1) % 1000);
         100 + count

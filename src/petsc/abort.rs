@@ -26,7 +26,7 @@ pub fn install_panic_hook() {
 /// For an error from the inside of a collective PETSc call. Where all ranks have one, it comes back,
 /// and the run can end in order. It may be one rank's, though (a file that only it opens, memory that
 /// it does not get), and then the others wait for it in an exchange of PETSc's: all end.
-pub(super) fn unless_shared(comm: &SimpleCommunicator, error: Error) -> Error {
+pub(crate) fn unless_shared(comm: &SimpleCommunicator, error: Error) -> Error {
     let mut everybody = comm.immediate_barrier();
     let begin = Instant::now();
     while let Err(unfinished) = everybody.test() {
@@ -40,7 +40,7 @@ pub(super) fn unless_shared(comm: &SimpleCommunicator, error: Error) -> Error {
 }
 
 /// For an error that other ranks may not see: they would wait for ever.
-pub(super) fn end_all(rank: i32, error: &Error) -> ! {
+pub(crate) fn end_all(rank: i32, error: &Error) -> ! {
     if rank != 0 {
         // Where all have failed, the first speaks for all.
         std::thread::sleep(Duration::from_secs(2));

@@ -174,7 +174,7 @@ fn each_row<const R: usize, const C: usize>(
 }
 
 /// One reference to a PETSc shell matrix over a [`BlockProduct`].
-pub(super) struct Shell<T>(Object<sys::Mat>, PhantomData<T>);
+pub(crate) struct Shell<T>(Object<sys::Mat>, PhantomData<T>);
 
 /// What the shell multiplies by.
 struct Context<T> {
@@ -190,7 +190,7 @@ struct Ghosts {
 
 impl<T: Stored> Shell<T> {
     /// Collective.
-    pub(super) fn new(comm: &SimpleCommunicator, product: BlockProduct<T>) -> Result<Self> {
+    pub(crate) fn new(comm: &SimpleCommunicator, product: BlockProduct<T>) -> Result<Self> {
         let [rows, columns] = [index(product.size[0])?, index(product.size[1])?];
         let mut shell = Object(null_mut());
         let data = Box::new(Context { product, ghosts: None });
@@ -232,12 +232,12 @@ impl<T: Stored> Shell<T> {
         Ok(Shell(shell, PhantomData))
     }
 
-    pub(super) fn raw(&self) -> sys::Mat {
+    pub(crate) fn raw(&self) -> sys::Mat {
         self.0.0
     }
 
     /// Gives the values a new content.
-    pub(super) fn change(
+    pub(crate) fn change(
         &mut self,
         act: impl FnOnce(&mut BlockProduct<T>) -> Result<()>,
     ) -> Result<()> {

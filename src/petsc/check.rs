@@ -26,7 +26,7 @@ pub(crate) use petsc;
 static MESSAGE: Mutex<String> = Mutex::new(String::new());
 
 /// Error handler: keeps the first message and the names of the functions it passed through.
-pub(super) unsafe extern "C" fn remember(
+pub(crate) unsafe extern "C" fn remember(
     _comm: sys::MPI_Comm,
     line: c_int,
     function: *const c_char,
@@ -50,7 +50,7 @@ pub(super) unsafe extern "C" fn remember(
 
 /// `Ok` for zero; otherwise the stored message. A failed pivot, a floating-point exception or a
 /// solver that did not converge is the run's failure, everything else the environment's.
-pub(super) fn check(code: sys::PetscErrorCode, function: &str) -> Result<()> {
+pub(crate) fn check(code: sys::PetscErrorCode, function: &str) -> Result<()> {
     if code == 0 {
         return Ok(());
     }
@@ -67,14 +67,14 @@ pub(super) fn check(code: sys::PetscErrorCode, function: &str) -> Result<()> {
 }
 
 /// PETSc's own words in an error of [`check`], without the trace around them.
-pub(super) fn essence(error: &Error) -> String {
+pub(crate) fn essence(error: &Error) -> String {
     let text = error.to_string();
     let text = text.split_once(": ").map_or(text.as_str(), |(_, rest)| rest);
     text.split(" (in ").next().unwrap_or(text).lines().next().unwrap_or(text).trim().to_string()
 }
 
 /// The return code of a callback of our own that failed; the text is there for the caller of PETSc.
-pub(super) fn keep(error: &Error) -> sys::PetscErrorCode {
+pub(crate) fn keep(error: &Error) -> sys::PetscErrorCode {
     if let Ok(mut message) = MESSAGE.lock() {
         *message = error.to_string();
     }
@@ -82,7 +82,7 @@ pub(super) fn keep(error: &Error) -> sys::PetscErrorCode {
 }
 
 /// Copy of a C string; empty for null.
-pub(super) fn text_of(text: *const c_char) -> String {
+pub(crate) fn text_of(text: *const c_char) -> String {
     if text.is_null() {
         return String::new();
     }
@@ -90,13 +90,13 @@ pub(super) fn text_of(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
-pub(super) fn c_text(text: &str) -> Result<CString> {
+pub(crate) fn c_text(text: &str) -> Result<CString> {
     CString::new(text)
         .map_err(|_| Error::Input(format!("`{}` holds a zero byte", text.escape_debug())))
 }
 
 /// True between `PetscInitialize` and `PetscFinalize`.
-pub(super) fn running() -> bool {
+pub(crate) fn running() -> bool {
     let (mut started, mut ended) = (sys::PETSC_FALSE, sys::PETSC_FALSE);
     // SAFETY: both functions may be called at any time and only write the flag.
     unsafe {
@@ -106,7 +106,7 @@ pub(super) fn running() -> bool {
     started != sys::PETSC_FALSE && ended == sys::PETSC_FALSE
 }
 
-pub(super) fn require_running() -> Result<()> {
+pub(crate) fn require_running() -> Result<()> {
     if running() {
         Ok(())
     } else {
@@ -114,7 +114,7 @@ pub(super) fn require_running() -> Result<()> {
     }
 }
 
-pub(super) fn bool_of(flag: bool) -> sys::PetscBool {
+pub(crate) fn bool_of(flag: bool) -> sys::PetscBool {
     if flag { sys::PETSC_TRUE } else { sys::PETSC_FALSE }
 }
 

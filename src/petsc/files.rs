@@ -33,7 +33,7 @@ const PLAIN: [&str; 6] = [
 ];
 
 /// The files with options among the words of an argument list can be read. For the rank that reads.
-pub(super) fn require_readable(words: &[String]) -> Result<()> {
+pub(crate) fn require_readable(words: &[String]) -> Result<()> {
     for pair in words.windows(2) {
         let [option, file] = pair else { continue };
         if !WITH_OPTIONS.contains(&option.as_str()) || expanded_by_petsc(file) {

@@ -66,7 +66,7 @@ impl Forcing {
 }
 
 /// Makes the rule the default of `snes`; call before its options are read.
-pub(super) fn set_default(snes: sys::SNES) -> Result<()> {
+pub(crate) fn set_default(snes: sys::SNES) -> Result<()> {
     let rule = Forcing::new(0.0);
     petsc!(SNESKSPSetUseEW(snes, sys::PETSC_TRUE))?;
     petsc!(SNESKSPSetParametersEW(
@@ -86,7 +86,7 @@ const TRUE_NORM: [&str; 4] = ["cg", "gmres", "fgmres", "bcgs"];
 
 /// The rule that the options ask for, if the linear solver iterates. A `ksp_rtol` given by the
 /// user is a fixed tolerance, unless `snes_ksp_ew` is given too.
-pub(super) fn chosen(snes: sys::SNES, prefix: &str) -> Result<Option<Forcing>> {
+pub(crate) fn chosen(snes: sys::SNES, prefix: &str) -> Result<Option<Forcing>> {
     let (mut inner, mut kind, mut used) = (null_mut(), null(), sys::PETSC_FALSE);
     petsc!(SNESKSPGetUseEW(snes, &mut used))?;
     petsc!(SNESGetKSP(snes, &mut inner))?;

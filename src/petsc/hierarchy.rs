@@ -50,7 +50,7 @@ pub struct CoarsestRows {
 const SMOOTHED: [f64; 2] = [0.06, 1.1];
 
 /// Whether the solver's preconditioner is a cycle on given levels.
-pub(super) fn wanted(ksp: sys::KSP) -> Result<bool> {
+pub(crate) fn wanted(ksp: sys::KSP) -> Result<bool> {
     let mut pc = null_mut();
     petsc!(KSPGetPC(ksp, &mut pc))?;
     is_type(pc, sys::PCMG)
@@ -63,7 +63,7 @@ fn is_type(pc: sys::PC, kind: &[u8]) -> Result<bool> {
 }
 
 /// A hierarchy in use.
-pub(super) struct Installed {
+pub(crate) struct Installed {
     /// States of the matrix that the levels were made for, and that the products hold.
     made: sys::PetscObjectState,
     filled: sys::PetscObjectState,

@@ -191,7 +191,7 @@ fn judge(name: &str, value: &str) -> Result<Answer> {
 }
 
 /// `mg_levels_1_pc_type` is `pc_type` of a solver inside.
-pub(super) fn without_nesting(mut name: &str) -> &str {
+pub(crate) fn without_nesting(mut name: &str) -> &str {
     loop {
         let inner = NESTED
             .iter()

@@ -57,7 +57,7 @@ impl Ksp {
     }
 
     /// Takes over one reference to a live `KSP`.
-    pub(super) fn from_reference(raw: sys::KSP, comm: &SimpleCommunicator, prefix: &str) -> Self {
+    pub(crate) fn from_reference(raw: sys::KSP, comm: &SimpleCommunicator, prefix: &str) -> Self {
         Ksp { raw, comm: comm.duplicate(), prefix: prefix.into(), matrix: 0 }
     }
 
@@ -152,7 +152,7 @@ impl Drop for Ksp {
 
 /// Drops all that belongs to the old matrix, so that one of another size can follow. A reset is
 /// not enough: GAMG would keep its levels. The preconditioner is made anew from its options.
-pub(super) fn forget(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
+pub(crate) fn forget(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
     petsc!(KSPReset(ksp))?;
     let (mut pc, mut kind) = (null_mut(), null());
     petsc!(KSPGetPC(ksp, &mut pc))?;
@@ -185,7 +185,7 @@ pub fn gathered_lu(comm: &SimpleCommunicator) -> Vec<(&'static str, String)> {
 
 /// How the ranks came to an [`outcome`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Ranks {
+pub(crate) enum Ranks {
     Agreed,
     /// PETSc knows of the failure on some of them only.
     Apart,
@@ -194,7 +194,7 @@ pub(super) enum Ranks {
 /// The end of the last solve of a live `KSP`: it failed on all ranks if it did on one. PETSc leaves
 /// that to the iteration's sums, and a direct solver has none: where the factors are one rank's
 /// (telescope, block Jacobi), the others take what comes for the solution. Collective.
-pub(super) fn outcome(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<(KspOutcome, Ranks)> {
+pub(crate) fn outcome(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<(KspOutcome, Ranks)> {
     let mine = reason_of(ksp);
     // An error is lower than any of PETSc's reasons; the negative ones are failures.
     let reason = *mine.as_ref().unwrap_or(&-i32::MAX);
@@ -304,7 +304,7 @@ fn solvers_inside(pc: sys::PC) -> Result<Vec<sys::KSP>> {
     Ok(unsafe { std::slice::from_raw_parts(several, count.max(0) as usize) }.to_vec())
 }
 
-pub(super) fn describe(ksp: sys::KSP) -> Result<String> {
+pub(crate) fn describe(ksp: sys::KSP) -> Result<String> {
     let (mut method, mut pc, mut pc_type) = (null(), null_mut(), null());
     petsc!(KSPGetType(ksp, &mut method))?;
     petsc!(KSPGetPC(ksp, &mut pc))?;

@@ -281,11 +281,11 @@ impl Matrix {
         self.row_offsets.last().copied().unwrap_or(0)
     }
 
-    pub(super) fn raw(&self) -> sys::Mat {
+    pub(crate) fn raw(&self) -> sys::Mat {
         self.raw
     }
 
-    pub(super) fn id(&self) -> u64 {
+    pub(crate) fn id(&self) -> u64 {
         self.id
     }
 }

@@ -4,9 +4,9 @@ use super::check::running;
 use super::sys;
 
 /// One reference to a PETSc object; null is none.
-pub(super) struct Object<T: Handle>(pub(super) T);
+pub(crate) struct Object<T: Handle>(pub(crate) T);
 
-pub(super) trait Handle: Copy {
+pub(crate) trait Handle: Copy {
     fn object(self) -> sys::PetscObject;
 }
 

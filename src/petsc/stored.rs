@@ -21,15 +21,15 @@ impl Stored for f64 {
 }
 
 /// Kernels load four values, of which the last of a block of 3x3 may lie beyond it.
-pub(super) const BEYOND: usize = 1;
+pub(crate) const BEYOND: usize = 1;
 
 /// Bytes of values between what is used and what is asked for: the rows are too short for the
 /// processor to foresee the next ones.
-pub(super) const AHEAD: usize = 8192;
+pub(crate) const AHEAD: usize = 8192;
 
 /// Asks for what lies `ahead` bytes further on.
 #[inline(always)]
-pub(super) fn fetch<T>(here: *const T, ahead: usize) {
+pub(crate) fn fetch<T>(here: *const T, ahead: usize) {
     #[cfg(target_arch = "x86_64")]
     {
         use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
@@ -47,7 +47,7 @@ pub(super) fn fetch<T>(here: *const T, ahead: usize) {
 #[cfg(target_arch = "x86_64")]
 #[inline]
 #[target_feature(enable = "avx2,fma")]
-pub(super) unsafe fn load<T: Stored>(from: *const T) -> std::arch::x86_64::__m256d {
+pub(crate) unsafe fn load<T: Stored>(from: *const T) -> std::arch::x86_64::__m256d {
     use std::arch::x86_64::{_mm_loadu_ps, _mm256_cvtps_pd, _mm256_loadu_pd};
     // SAFETY: the caller's, and the type is the one that `DOUBLE` says.
     unsafe {

@@ -32,7 +32,7 @@ impl Vector {
     }
 
     /// Takes over a new PETSc vector with `local` values and zeroes it.
-    pub(super) fn own(raw: sys::Vec, local: usize) -> Result<Self> {
+    pub(crate) fn own(raw: sys::Vec, local: usize) -> Result<Self> {
         let mut vector = Vector { raw, local };
         vector.set(0.0)?;
         Ok(vector)
@@ -45,7 +45,7 @@ impl Vector {
         Self::own(raw, self.local)
     }
 
-    pub(super) fn raw(&self) -> sys::Vec {
+    pub(crate) fn raw(&self) -> sys::Vec {
         self.raw
     }
 
@@ -131,7 +131,7 @@ impl<'v> Values<'v> {
 
     /// # Safety
     /// `raw` stays alive, and nobody writes its values, while the guard lives.
-    pub(super) unsafe fn of(raw: sys::Vec) -> Result<Self> {
+    pub(crate) unsafe fn of(raw: sys::Vec) -> Result<Self> {
         let mut count = 0;
         petsc!(VecGetLocalSize(raw, &mut count))?;
         let mut pointer = std::ptr::null();
@@ -175,7 +175,7 @@ impl<'v> ValuesMut<'v> {
 
     /// # Safety
     /// `raw` stays alive, and nobody else touches its values, while the guard lives.
-    pub(super) unsafe fn of(raw: sys::Vec) -> Result<Self> {
+    pub(crate) unsafe fn of(raw: sys::Vec) -> Result<Self> {
         let mut count = 0;
         petsc!(VecGetLocalSize(raw, &mut count))?;
         let mut pointer = null_mut();
@@ -211,7 +211,7 @@ impl Drop for ValuesMut<'_> {
 }
 
 /// A size or number as PETSc's 32-bit integer.
-pub(super) fn index(value: usize) -> Result<sys::PetscInt> {
+pub(crate) fn index(value: usize) -> Result<sys::PetscInt> {
     sys::PetscInt::try_from(value).map_err(|_| {
         Error::Environment(format!(
             "{value} does not fit the 32-bit integers of this PETSc (limit {}); use more ranks, \

@@ -4,7 +4,7 @@
 use std::any::Any;
 
 /// An order that is applied to one field after the other.
-pub(super) struct Gather<'a> {
+pub(crate) struct Gather<'a> {
     order: &'a [usize],
     /// A `Vec<T>`: the memory that the last field left; the next one is mostly of its type.
     spare: Box<dyn Any>,
@@ -32,12 +32,12 @@ impl<'a> Gather<'a> {
 }
 
 /// Room for this many points and a few that arrive later.
-pub(super) fn with_slack(points: usize) -> usize {
+pub(crate) fn with_slack(points: usize) -> usize {
     points + points / 64
 }
 
 /// Values that change place, one after the other.
-pub(super) struct Moves {
+pub(crate) struct Moves {
     from_to: Vec<(usize, usize)>,
     /// How many values there are in the end.
     left: usize,

@@ -11,7 +11,7 @@ use super::{Points, rectangle_corners};
 
 /// Sub-cells or Gauss points of mesh cells. A mesh body has no outermost layer: its boundary is
 /// the mesh's own.
-pub(super) struct CellSeeding<'a, const D: usize> {
+pub(crate) struct CellSeeding<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     index: usize,
     pub body: &'a Body,
@@ -23,7 +23,7 @@ pub(super) struct CellSeeding<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> CellSeeding<'a, D> {
-    pub(super) fn new(
+    pub(crate) fn new(
         deck: &'a Deck,
         mesh: &'a Mesh<D>,
         index: usize,
@@ -55,12 +55,12 @@ impl<'a, const D: usize> CellSeeding<'a, D> {
         6 * n.pow(D as u32)
     }
 
-    pub(super) fn candidates(&self) -> u64 {
+    pub(crate) fn candidates(&self) -> u64 {
         (self.cells.len() * self.per_cell()) as u64
     }
 
     /// Makes the points that are inside, in the cells of the share that are wanted.
-    pub(super) fn run(
+    pub(crate) fn run(
         &self,
         points: &mut Points<D>,
         share: Share,

@@ -18,7 +18,7 @@ impl Share {
     /// This rank's part of a box of `size` candidates: about as many inside the shape as on any
     /// other rank, and in slices across the longest axis, as parts of the body will mostly be, so
     /// that few points have to change rank. `inside` tells of a place in units of candidates.
-    pub(super) fn of_box<const D: usize>(
+    pub(crate) fn of_box<const D: usize>(
         &self,
         size: [usize; D],
         inside: impl Fn(&[f64; D]) -> bool,
@@ -64,7 +64,7 @@ const SLICES: usize = 64;
 const SAMPLES_ACROSS: usize = 16;
 
 /// Candidates that follow each other where those along `axis` differ slowest.
-pub(super) struct Slice<const D: usize> {
+pub(crate) struct Slice<const D: usize> {
     size: [usize; D],
     axis: usize,
     range: Range<usize>,
@@ -73,7 +73,7 @@ pub(super) struct Slice<const D: usize> {
 impl<const D: usize> Slice<D> {
     /// Calls `visit` with number and index of each, in ascending order of the number, which counts
     /// with the first axis fastest.
-    pub(super) fn for_each(&self, mut visit: impl FnMut(usize, [usize; D])) {
+    pub(crate) fn for_each(&self, mut visit: impl FnMut(usize, [usize; D])) {
         let Slice { size, axis, range } = self;
         let layer: usize = size.iter().product::<usize>() / size[*axis].max(1);
         if range.is_empty() {
@@ -96,7 +96,7 @@ impl<const D: usize> Slice<D> {
 }
 
 /// Index of `flat` in an array of these counts, first axis fastest.
-pub(super) fn split<const D: usize>(mut flat: usize, counts: &[usize]) -> [usize; D] {
+pub(crate) fn split<const D: usize>(mut flat: usize, counts: &[usize]) -> [usize; D] {
     std::array::from_fn(|axis| {
         let i = flat % counts[axis];
         flat /= counts[axis];

@@ -12,18 +12,21 @@ use std::path::Path;
 
 use counts::Numbers;
 use limits::Machine;
-use mpm_par::analysis::discretise::{Discretisation, Model};
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
-use mpm_par::analysis::{setup, solver, update};
-use mpm_par::assembly::conditions::{Conditions, StepSpan};
-use mpm_par::assembly::internal::{self, deformation_increment};
-use mpm_par::assembly::{BlockMatrix, Numbering};
+use mpm_par::analysis::solver;
 use mpm_par::error::Result;
 use mpm_par::mechanics::{self, StepStart};
 use mpm_par::parallel::World;
 use mpm_par::petsc::Session;
 use mpm_par::petsc::snes::NewtonProblem;
 use mpm_par::points::Points;
+use mpm_par::run::setup;
+use mpm_par::system::conditions::{Conditions, StepSpan};
+use mpm_par::system::numbering::Numbering;
+use mpm_par::system::scatter::BlockMatrix;
+use mpm_par::system::step_system::{Discretisation, Model};
+use mpm_par::system::terms::stress::{self, deformation_increment};
+use mpm_par::transfer::update;
 use mpm_par::{basis, deck};
 use report::{Sample, machine, resident_bytes, sample, sample_parts};
 
@@ -320,7 +323,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     let mut force = vec![0.0; numbering.len() * D];
     let mut stiffness = BlockMatrix::<D>::zeros(&mesh.pattern);
     let assemble = sample(count, || {
-        let sound = internal::assemble(
+        let sound = stress::assemble(
             step,
             frame,
             numbering,

@@ -1,7 +1,5 @@
 //! The same answer on one to four ranks, also where a partition cuts domains.
 
-use mpm_par::analysis::discretise::Discretisation;
-use mpm_par::analysis::setup;
 use mpm_par::basis;
 use mpm_par::deck::model::{Basis, MeshMotion};
 use mpm_par::grid::Grid;
@@ -10,6 +8,8 @@ use mpm_par::parallel::{Partition, World};
 use mpm_par::points::Points;
 use mpm_par::points::seed::{CellByCell, seed};
 use mpm_par::points::share::Share;
+use mpm_par::run::setup;
+use mpm_par::system::step_system::Discretisation;
 use mpm_par::{deck, parallel};
 
 use crate::common::on_ranks;

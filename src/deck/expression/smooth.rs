@@ -15,7 +15,7 @@ pub struct Smooth {
 
 impl Smooth {
     /// From the fully parenthesised form. Error: an operator or function without a rule.
-    pub(super) fn parse(normal: &str) -> Result<Self, String> {
+    pub(crate) fn parse(normal: &str) -> Result<Self, String> {
         if let Some(name) = without_rule(normal) {
             return Err(format!(
                 "`{name}` has no derivative rule; use + - * / ^ atan2 {}",

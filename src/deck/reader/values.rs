@@ -22,14 +22,14 @@ impl Table<'_> {
         }
     }
 
-    pub(super) fn text_in(&self, key: &Key, node: &Node) -> Got<String> {
+    pub(crate) fn text_in(&self, key: &Key, node: &Node) -> Got<String> {
         match &node.value {
             Value::String(text) => Ok(text.clone()),
             _ => Err(self.mismatch(key, node)),
         }
     }
 
-    pub(super) fn items<'n>(&self, key: &Key, node: &'n Node) -> Got<&'n [Node]> {
+    pub(crate) fn items<'n>(&self, key: &Key, node: &'n Node) -> Got<&'n [Node]> {
         match &node.value {
             Value::Array(items) => Ok(items),
             _ => Err(self.mismatch(key, node)),
@@ -37,7 +37,7 @@ impl Table<'_> {
     }
 
     /// `items` that must be one per axis.
-    pub(super) fn per_axis<'n>(
+    pub(crate) fn per_axis<'n>(
         &self,
         key: &Key,
         node: &'n Node,

@@ -6,9 +6,9 @@ mod location;
 mod meshes;
 mod moving;
 
-use super::element::Element;
 use super::generate::{annulus, box_mesh};
 use super::mesh::Mesh;
+use crate::deck::model::Element;
 
 /// A ring like that of Rotation §3.2.
 pub(crate) fn ring(inner: [f64; 2], element: Element, grading: f64) -> Mesh<2> {

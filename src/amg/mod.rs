@@ -1,0 +1,216 @@
+//! Multigrid by smoothed aggregation for systems of nodal displacements: the hierarchy of levels
+//! that the solver's cycle runs on (Vanek, Mandel and Brezina, Computing 56 (1996) 179).
+//!
+//! | step | file |
+//! |---|---|
+//! | which nodes move together | `strength.rs` |
+//! | groups of nodes that become one | `aggregate.rs` |
+//! | motions of a coarse node | `rigid.rs` |
+//! | largest eigenvalue, for damping and smoother | `spectrum.rs` |
+//! | transfer between levels | `prolongator.rs` |
+//! | whose nodes they are | `owners.rs` |
+//! | coarse operator | `galerkin.rs` |
+//! | nodes and rows of a level | `level.rs` |
+//!
+//! Whole blocks of a node are the unit throughout, each rank works on its own rows, and nothing
+//! depends on how nodes are dealt out to ranks but the order of sums: iterations are the same on
+//! any number of them.
+
+pub mod aggregate;
+pub mod galerkin;
+pub mod level;
+pub mod owners;
+pub mod prolongator;
+pub mod rigid;
+pub mod spectrum;
+pub mod strength;
+
+use level::{Assembled, Nodes, Rows};
+
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::parallel::World;
+use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed, Stored};
+use crate::system::numbering::Numbering;
+
+use aggregate::Aggregates;
+use galerkin::Coarse;
+use prolongator::{Lengths, Parts, Prolongator};
+use strength::Strong;
+
+/// Degrees of freedom that are few enough to be solved directly.
+const COARSEST: usize = 600;
+const MOST_LEVELS: usize = 12;
+/// Couplings below this share are weak.
+const THRESHOLD: f64 = 0.03;
+/// Of the prolongator's smoothing, over the largest eigenvalue.
+const DAMPING: f64 = 1.5;
+
+/// How a level is coarsened.
+#[derive(Debug, Clone, Copy)]
+struct Coarsening {
+    /// Strong couplings between two roots, at least one more than these.
+    distance: usize,
+    /// A next level with a larger share of the nodes is not worth having.
+    most_left: f64,
+}
+
+/// A second ring around the roots costs a few iterations, and halves a set-up that is dear on the
+/// finest level alone.
+const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
+const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
+
+/// The hierarchy under an assembled system of displacements. Collective.
+pub fn of_system<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    numbering: &Numbering,
+    rows: &Assembled,
+) -> Result<Option<Hierarchy>> {
+    let nodes = Nodes {
+        owned: numbering.owned,
+        global: numbering.global.clone(),
+        halo: numbering.halo.clone(),
+        position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
+        key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
+    };
+    match D {
+        2 => build::<2, 3>(world, &nodes, rows),
+        _ => build::<3, 6>(world, &nodes, rows),
+    }
+}
+
+fn padded<const D: usize>(position: [f64; D]) -> [f64; 3] {
+    std::array::from_fn(|k| position.get(k).copied().unwrap_or(0.0))
+}
+
+/// A number between 0 and 1 that looks random (SplitMix64).
+fn key(node: u64) -> f64 {
+    let mut z = node.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 + f64::MIN_POSITIVE
+}
+
+/// The hierarchy under the matrix `rows` of `K` displacements per node; `C`: rigid-body modes, 3 in
+/// the plane and 6 in space. `None` where no node is coupled to another. Collective.
+pub fn build<const K: usize, const C: usize>(
+    world: &World,
+    nodes: &Nodes,
+    rows: &impl Rows<K>,
+) -> Result<Option<Hierarchy>> {
+    let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
+    let mut exact = BlockProduct::symmetric::<K>(nodes.owned, ghosts.clone(), count);
+    fill(rows, &mut exact);
+    let mut rounded = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count);
+    exact.round_into(&mut rounded);
+    let mut levels = Vec::new();
+    let first = coarsen::<K, C>(world, nodes, rows, rounded, 1.0, FINEST)?;
+    let Some((level, mut coarse, mut length)) = first else { return Ok(None) };
+    levels.push(level);
+    while levels.len() < MOST_LEVELS && world.sum_usize(coarse.nodes.owned) * C > COARSEST {
+        let (nodes, rows) = (&coarse.nodes, &coarse.rows);
+        let product = product(nodes, rows);
+        let next = coarsen::<C, C>(world, nodes, rows, product, length, COARSER)?;
+        let Some((level, coarser, coarser_length)) = next else { break };
+        levels.push(level);
+        (coarse, length) = (coarser, coarser_length);
+    }
+    Ok(Some(Hierarchy { exact, levels, coarsest: coarsest(&coarse) }))
+}
+
+/// One level, the next, and the latter's length of rotations (m). `None` where the next has too many
+/// nodes to be worth having, or none.
+fn coarsen<const K: usize, const C: usize>(
+    world: &World,
+    nodes: &Nodes,
+    rows: &impl Rows<K>,
+    product: BlockProduct<f32>,
+    length: f64,
+    how: Coarsening,
+) -> Result<Option<(Smoothed, Coarse<C>, f64)>> {
+    let strong = Strong::of(world, nodes, rows, THRESHOLD)?;
+    let aggregates = Aggregates::find(world, nodes, &strong, how.distance)?;
+    let all = world.sum_usize(nodes.owned);
+    if aggregates.total == 0 || aggregates.total as f64 > how.most_left * all as f64 {
+        return Ok(None);
+    }
+    let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };
+    let inverse: Vec<f64> = product.diagonal().into_iter().map(one_over).collect();
+    let largest = spectrum::largest::<K>(world, nodes, &product, &inverse)?;
+    let lengths = Lengths::measured(world, nodes, &aggregates, length);
+    let damping = if largest > 0.0 { DAMPING / largest } else { 0.0 };
+    let parts = Parts {
+        nodes,
+        strong: &strong,
+        aggregates: &aggregates,
+        lengths,
+        inverse: &inverse,
+        damping,
+    };
+    let prolongator = Prolongator::<K, C>::smoothed(world, rows, &parts)?;
+    let coarse = galerkin::coarse_operator(world, nodes, rows, &prolongator, &aggregates)?;
+    let transfer = transfer(nodes, &prolongator, &coarse.nodes);
+    let level = Smoothed { product, largest, transfer };
+    Ok(Some((level, coarse, lengths.coarse)))
+}
+
+/// A level's matrix for the cycle.
+fn product<const K: usize>(nodes: &Nodes, rows: &impl Rows<K>) -> BlockProduct<f32> {
+    let ghosts = nodes.global[nodes.owned..].to_vec();
+    let mut product = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count(nodes, rows));
+    fill(rows, &mut product);
+    product
+}
+
+/// Blocks in the owned rows.
+fn count<const K: usize>(nodes: &Nodes, rows: &impl Rows<K>) -> usize {
+    (0..nodes.owned).map(|row| rows.columns(row).len()).sum()
+}
+
+/// The values of `rows` into a product with them.
+pub fn fill<T: Stored, const K: usize>(rows: &impl Rows<K>, product: &mut BlockProduct<T>) {
+    product.fill::<K>(|row, blocks| {
+        rows.visit(row, |column, block| blocks.push((column, *block)));
+    });
+}
+
+/// The transfer for the cycle: the owned rows, by local coarse nodes.
+fn transfer<const K: usize, const C: usize>(
+    fine: &Nodes,
+    prolongator: &Prolongator<K, C>,
+    coarse: &Nodes,
+) -> BlockProduct<f32> {
+    let (ghosts, count) = (coarse.global[coarse.owned..].to_vec(), prolongator.offsets[fine.owned]);
+    BlockProduct::collect::<K, C>(fine.owned, coarse.owned, ghosts, count, |row, blocks| {
+        let (columns, values) = prolongator.row(row);
+        let places = columns.iter().map(|&number| coarse.place(number));
+        blocks.extend(places.zip(values.iter().copied()));
+    })
+}
+
+/// The last level in compressed rows. A motion that no node of the finer level takes part in has
+/// none of its own stiffness: a trace of its neighbours' keeps the matrix regular.
+fn coarsest<const C: usize>(coarse: &Coarse<C>) -> CoarsestRows {
+    const TRACE: f64 = 1e-9;
+    let (nodes, rows) = (&coarse.nodes, &coarse.rows);
+    let mut result = CoarsestRows { block: C, offsets: vec![0], ..CoarsestRows::default() };
+    for row in 0..nodes.owned {
+        let range = rows.offsets[row]..rows.offsets[row + 1];
+        let mut entries: Vec<_> = range
+            .map(|k| (nodes.global[rows.columns[k] as usize], rows.columns[k], rows.values[k]))
+            .collect();
+        entries.sort_unstable_by_key(|entry| entry.0);
+        for r in 0..C {
+            for (number, column, block) in &entries {
+                let own = *column as usize == row;
+                let scale = (0..C).map(|k| block[k][k]).fold(f64::MIN_POSITIVE, f64::max);
+                result.columns.extend((0..C as i32).map(|c| number * C as i32 + c));
+                let trace = |c: usize| if own && c == r { TRACE * scale } else { 0.0 };
+                result.values.extend((0..C).map(|c| block[r][c] + trace(c)));
+            }
+            result.offsets.push(result.columns.len() as i32);
+        }
+    }
+    result
+}

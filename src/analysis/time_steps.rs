@@ -1,0 +1,119 @@
+//! Time steps of explicit runs: equal ones, or a fraction of the stability limit
+//! dt = 2 / sqrt(lambda_max) of K x = lambda M x (Ghost §3.5).
+//!
+//! On a full grid lambda_max has closed forms: 12 D c^2 / h^2 with the consistent mass and
+//! 4 c^2 / h^2 with the lumped one, c the speed of pressure waves. Cut cells of a stabilised
+//! body come close to that (Ghost Figure 7); those of an unstabilised one do not matter, since
+//! the method starts each step from the points. A point may also not cross a cell in one step.
+//! `type = "conditioning"` gives the limit of the true eigenvalues for any position.
+
+use crate::deck::model::{Analysis, Mass};
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::material::Material;
+use crate::output::restart::run_state::RunState;
+use crate::parallel::World;
+use crate::points::Points;
+use crate::system::conditions::StepSpan;
+
+/// Where a run stands in time.
+#[derive(Debug, Clone)]
+pub struct TimeSteps {
+    duration: f64,
+    steps: Option<usize>,
+    cfl: f64,
+    done: usize,
+    time: f64,
+}
+
+impl TimeSteps {
+    pub fn new(analysis: &Analysis) -> Self {
+        TimeSteps {
+            duration: analysis.duration.unwrap_or(1.0),
+            steps: analysis.steps,
+            cfl: analysis.cfl.unwrap_or(1.0),
+            done: 0,
+            time: 0.0,
+        }
+    }
+
+    /// Writes the position into a checkpoint.
+    pub fn save(&self, state: &mut RunState) {
+        state.set_count("time_steps.done", self.done as u64);
+        state.set("time_steps.time", self.time);
+    }
+
+    /// Takes the position out of a checkpoint.
+    pub fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.done = state.count("time_steps.done")? as usize;
+        self.time = state.number("time_steps.time")?;
+        Ok(())
+    }
+
+    /// True where the steps follow the stability limit.
+    pub fn follows_limit(&self) -> bool {
+        self.steps.is_none()
+    }
+
+    /// Number of the next step, from 1.
+    pub fn number(&self) -> usize {
+        self.done + 1
+    }
+
+    /// The next step; `limit` is read where the steps follow it. `None` at the end.
+    pub fn next(&self, limit: f64) -> Option<StepSpan> {
+        let (start, end) = match self.steps {
+            Some(steps) if self.done < steps => {
+                let at = |step: usize| self.duration * (step as f64 / steps as f64);
+                (at(self.done), at(self.done + 1))
+            }
+            Some(_) => return None,
+            None => {
+                let left = self.duration - self.time;
+                if left <= 1e-12 * self.duration {
+                    return None;
+                }
+                // Equal steps to the end, as long as the limit stays what it is.
+                let count = (left / (self.cfl * limit)).ceil().max(1.0);
+                let end = if count == 1.0 { self.duration } else { self.time + left / count };
+                (self.time, end)
+            }
+        };
+        Some(StepSpan {
+            factor_start: start / self.duration,
+            factor_end: end / self.duration,
+            time_start: start,
+            time_end: end,
+        })
+    }
+
+    /// Moves on behind `span`.
+    pub fn accept(&mut self, span: StepSpan) {
+        self.done += 1;
+        self.time = span.time_end;
+    }
+}
+
+/// The stability limit, s, and Σ m c^2, J. Collective.
+pub fn stability_limit<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    materials: &[Material],
+    mass: Mass,
+    points: &Points<D>,
+) -> (f64, f64) {
+    let h = grid.cell_size();
+    let factor = match mass {
+        Mass::Consistent => (3.0 * D as f64).sqrt(),
+        Mass::Lumped => 1.0,
+    };
+    let (mut rate, mut wave_energy) = (0.0f64, 0.0);
+    for p in 0..points.len() {
+        let modulus = materials[points.body[p] as usize].elasticity().p_wave_modulus();
+        let wave = modulus * points.volume(p) / points.mass[p];
+        let speed = points.velocity[p].iter().map(|v| v * v).sum::<f64>().sqrt();
+        rate = rate.max(wave.abs().sqrt() * factor + speed);
+        wave_energy += points.mass[p] * wave.abs();
+    }
+    (h / world.max(rate), world.sum(wave_energy))
+}

@@ -1,0 +1,17 @@
+//! The mass of the nodes and its solve.
+//!
+//! | file | idea |
+//! |---|---|
+//! | `matrix.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
+//! | `grid_mass.rs` | which of them a step uses (Ghost eq. 10) |
+//! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
+//! | `iteration.rs` | conjugate gradients on several right-hand sides |
+//! | `incomplete.rs`, `elimination.rs` | their preconditioner: Cholesky without fill, and its order |
+
+pub mod elimination;
+pub mod envelope;
+pub mod grid_mass;
+pub mod incomplete;
+pub mod inverse;
+pub mod iteration;
+pub mod matrix;

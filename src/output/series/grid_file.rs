@@ -1,0 +1,155 @@
+//! `grid-000005.h5` per output step and `grid.xdmf`: the active part of the background grid.
+
+use mpi::topology::{Communicator, SimpleCommunicator};
+
+use super::hdf5_writer::FileWriter;
+use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfSeries};
+use crate::deck::model::Element;
+use crate::error::Result;
+use crate::output::directory::ResultsDirectory;
+
+/// One rank's share of the active grid. Active nodes are numbered over all ranks, contiguous by
+/// rank: the nodes given here are the next ones after those of the lower ranks.
+#[derive(Debug, Clone, Copy)]
+pub struct GridFrame<'a, const D: usize> {
+    pub element: Element,
+    /// Owned active nodes, m.
+    pub coordinates: &'a [[f64; D]],
+    /// Owned active cells: [`nodes_of`] the element node numbers per cell, row by row.
+    pub connectivity: &'a [usize],
+    /// Displacement over the last step, m, per owned node.
+    pub displacement_increment: &'a [[f64; D]],
+    /// Force held by the constraints, N, per owned node; zero where the node is free.
+    pub reaction: &'a [[f64; D]],
+    /// More numbers per owned node: name and values.
+    pub node_fields: &'a [(&'a str, &'a [f64])],
+    /// Per owned cell: has a face that carries Ghost stabilisation.
+    pub ghost_boundary: &'a [bool],
+    /// More numbers per owned cell: name and values.
+    pub cell_fields: &'a [(&'a str, &'a [f64])],
+}
+
+/// Nodes of a cell of this kind.
+pub fn nodes_of(element: Element) -> usize {
+    topology_of(element).nodes_per_element()
+}
+
+fn topology_of(element: Element) -> Topology {
+    match element {
+        Element::Tri3 => Topology::Triangle,
+        Element::Quad4 => Topology::Quadrilateral,
+        Element::Tet4 => Topology::Tetrahedron,
+        Element::Hex8 => Topology::Hexahedron,
+    }
+}
+
+/// The grid's time series.
+pub struct GridSeries {
+    directory: ResultsDirectory,
+    series: XdmfSeries,
+}
+
+impl GridSeries {
+    pub fn create(directory: &ResultsDirectory) -> Self {
+        let series = XdmfSeries::new(&directory.file("grid.xdmf"));
+        Self { directory: directory.clone(), series }
+    }
+
+    /// Continues the series of a run that is restarted after `last_step`. Nothing is written before
+    /// [`Self::cut`].
+    pub fn resume(
+        directory: &ResultsDirectory,
+        last_step: usize,
+        comm: &SimpleCommunicator,
+    ) -> Result<Self> {
+        let series = XdmfSeries::resume(&directory.file("grid.xdmf"), last_step, comm)?;
+        Ok(Self { directory: directory.clone(), series })
+    }
+
+    /// [`XdmfSeries::cut`]
+    pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        self.series.cut(comm)
+    }
+
+    /// Writes the active grid of `step`. `time` is in s, or the load factor.
+    pub fn write<const D: usize>(
+        &mut self,
+        step: usize,
+        time: f64,
+        frame: &GridFrame<'_, D>,
+        comm: &SimpleCommunicator,
+    ) -> Result<()> {
+        let topology = topology_of(frame.element);
+        let per_cell = topology.nodes_per_element();
+        let nodes = frame.coordinates.len();
+        let cells = frame.connectivity.len() / per_cell;
+        assert_eq!(frame.displacement_increment.len(), nodes, "one increment per node");
+        assert_eq!(frame.reaction.len(), nodes, "one reaction per node");
+        assert_eq!(frame.ghost_boundary.len(), cells, "one flag per cell");
+
+        let name = format!("grid-{step:06}.h5");
+        let file = FileWriter::create(&self.directory.file(&name), comm)?;
+        file.write_number("step", &(step as u64))?;
+        file.write_number("time", &time)?;
+        let item = |number, rows, columns, dataset: &str| DataItem {
+            number,
+            rows,
+            columns,
+            file: name.clone(),
+            dataset: dataset.into(),
+        };
+        let connectivity: Vec<i64> = frame.connectivity.iter().map(|&node| node as i64).collect();
+        let all_nodes = file.write_rows("coordinates", 3, &in_space(frame.coordinates))?;
+        let all_cells = file.write_rows("connectivity", per_cell, &connectivity)?;
+
+        let mut attributes = Vec::new();
+        let mut attribute = |name: &str, center, number, columns| {
+            let rows = if center == Center::Node { all_nodes } else { all_cells };
+            let data = item(number, rows, columns, name);
+            attributes.push(Attribute { name: name.into(), center, data });
+        };
+        for (name, vectors) in
+            [("displacement_increment", frame.displacement_increment), ("reaction", frame.reaction)]
+        {
+            file.write_rows(name, 3, &in_space(vectors))?;
+            attribute(name, Center::Node, Number::Float, 3);
+        }
+        for (name, values) in frame.node_fields {
+            assert_eq!(values.len(), nodes, "{name}: one value per node");
+            file.write_rows(name, 1, values)?;
+            attribute(name, Center::Node, Number::Float, 1);
+        }
+        let rank = i64::from(comm.rank());
+        file.write_rows("node_rank", 1, &vec![rank; nodes])?;
+        attribute("node_rank", Center::Node, Number::Int, 1);
+        file.write_rows("cell_rank", 1, &vec![rank; cells])?;
+        attribute("cell_rank", Center::Cell, Number::Int, 1);
+        let flags: Vec<i64> = frame.ghost_boundary.iter().map(|&flag| i64::from(flag)).collect();
+        file.write_rows("ghost_boundary", 1, &flags)?;
+        attribute("ghost_boundary", Center::Cell, Number::Int, 1);
+        for (name, values) in frame.cell_fields {
+            assert_eq!(values.len(), cells, "{name}: one value per cell");
+            file.write_rows(name, 1, values)?;
+            attribute(name, Center::Cell, Number::Float, 1);
+        }
+        file.finish()?;
+
+        let snapshot = Snapshot {
+            step,
+            time,
+            topology,
+            connectivity: item(Number::Int, all_cells, per_cell, "connectivity"),
+            geometry: item(Number::Float, all_nodes, 3, "coordinates"),
+            attributes,
+        };
+        self.series.push(&snapshot, comm)
+    }
+}
+
+fn in_space<const D: usize>(vectors: &[[f64; D]]) -> Vec<f64> {
+    let mut rows = Vec::with_capacity(3 * vectors.len());
+    for vector in vectors {
+        crate::output::series::point_field::append_vector(vector, &mut rows);
+    }
+    rows
+}

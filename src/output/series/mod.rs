@@ -1,0 +1,17 @@
+//! Fields over time, for ParaView and Python: HDF5 data and the XDMF that describes them.
+//!
+//! | file on disk | file |
+//! |---|---|
+//! | `points-*.h5`, `points.xdmf` | `points_file.rs`, `point_field.rs` |
+//! | `domains.xdmf` | `domains.rs` |
+//! | `grid-*.h5`, `grid.xdmf` | `grid_file.rs` |
+//! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
+//! | XDMF time series | `xdmf.rs` |
+
+pub mod domains;
+pub mod grid_file;
+pub mod hdf5_reader;
+pub mod hdf5_writer;
+pub mod point_field;
+pub mod points_file;
+pub mod xdmf;

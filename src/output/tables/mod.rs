@@ -1,0 +1,11 @@
+//! Tables that grow row by row.
+//!
+//! | file on disk | file |
+//! |---|---|
+//! | `history.csv` | `history.rs` |
+//! | `residuals.csv` | `residuals.rs` |
+//! | any such table | `csv_table.rs` |
+
+pub mod csv_table;
+pub mod history;
+pub mod residuals;

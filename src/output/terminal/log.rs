@@ -1,0 +1,131 @@
+//! What is said to the user: on the terminal and in `log.txt`, by rank 0.
+
+use std::fs::{File, OpenOptions};
+use std::io::{IsTerminal, Write};
+
+use mpi::topology::{Communicator, SimpleCommunicator};
+
+use crate::error::Result;
+use crate::output::agreement::on_root;
+use crate::output::directory::{LOG, ResultsDirectory};
+use crate::output::whole_file::cannot_write;
+
+/// Erases the line that the next text replaces.
+const ERASE_LINE: &str = "\r\x1b[2K";
+
+/// Speaks on rank 0 and is silent elsewhere. The directory may come later than the first words:
+/// they are kept and written to `log.txt` once it is known.
+#[derive(Debug)]
+pub struct Log {
+    speaks: bool,
+    on_terminal: bool,
+    /// A line without an end stands on the terminal.
+    transient: bool,
+    unwritten: String,
+    file: Option<File>,
+}
+
+impl Log {
+    pub fn new(comm: &SimpleCommunicator) -> Self {
+        let speaks = comm.rank() == 0;
+        Self {
+            speaks,
+            on_terminal: speaks && stdout_is_terminal(),
+            transient: false,
+            unwritten: String::new(),
+            file: None,
+        }
+    }
+
+    /// A silent log, for tests and for work that has nobody to talk to.
+    pub fn silent() -> Self {
+        Self {
+            speaks: false,
+            on_terminal: false,
+            transient: false,
+            unwritten: String::new(),
+            file: None,
+        }
+    }
+
+    /// Opens `log.txt`; `resume` continues the one that is there.
+    pub fn attach(
+        &mut self,
+        directory: &ResultsDirectory,
+        resume: bool,
+        comm: &SimpleCommunicator,
+    ) -> Result<()> {
+        on_root(comm, || {
+            let path = directory.file(LOG);
+            let mut options = OpenOptions::new();
+            options.create(true).write(true).append(resume).truncate(!resume);
+            let file = options.open(&path).and_then(|mut file| {
+                file.write_all(self.unwritten.as_bytes())?;
+                Ok(file)
+            });
+            self.file = Some(file.map_err(|reason| cannot_write(&path, &reason))?);
+            self.unwritten.clear();
+            Ok(())
+        })
+    }
+
+    pub fn on_terminal(&self) -> bool {
+        self.on_terminal
+    }
+
+    /// Says `text`, which may have several lines, on the terminal and in the file.
+    pub fn say(&mut self, text: &str) {
+        self.show(text);
+        self.note(text);
+    }
+
+    /// Says `text` on the terminal only.
+    pub fn show(&mut self, text: &str) {
+        if self.speaks {
+            let erase = if std::mem::take(&mut self.transient) { ERASE_LINE } else { "" };
+            // Nobody listens to a closed pipe; the run and its files go on.
+            let mut out = std::io::stdout().lock();
+            let _ = writeln!(out, "{erase}{}", text.trim_end_matches('\n'));
+            let _ = out.flush();
+        }
+    }
+
+    /// Shows a line that the next one replaces; nothing where output is not a terminal.
+    pub fn show_briefly(&mut self, line: &str) {
+        if self.on_terminal {
+            let mut out = std::io::stdout().lock();
+            let _ = write!(out, "{ERASE_LINE}{line}");
+            let _ = out.flush();
+            self.transient = true;
+        }
+    }
+
+    /// Writes `text` to the file only.
+    pub fn note(&mut self, text: &str) {
+        if !self.speaks {
+            return;
+        }
+        let text = format!("{}\n", text.trim_end_matches('\n'));
+        match &mut self.file {
+            // The results themselves report a full disk; the log does not stop a run.
+            Some(file) => drop(file.write_all(text.as_bytes())),
+            None => self.unwritten.push_str(&text),
+        }
+    }
+}
+
+/// Open MPI gives every rank a pseudo-terminal, also when its own output goes to a file; then
+/// only the launcher's output tells.
+fn stdout_is_terminal() -> bool {
+    if !std::io::stdout().is_terminal() {
+        return false;
+    }
+    if std::env::var_os("OMPI_COMM_WORLD_RANK").is_none() {
+        return true;
+    }
+    let launcher = std::os::unix::process::parent_id();
+    std::fs::read_link(format!("/proc/{launcher}/fd/1")).is_ok_and(|target| {
+        let target = target.to_string_lossy();
+        target.starts_with("/dev/pts/") || target.starts_with("/dev/tty")
+    })
+}

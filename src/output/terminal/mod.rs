@@ -1,0 +1,11 @@
+//! What the terminal and `log.txt` say.
+//!
+//! | idea | file |
+//! |---|---|
+//! | text of the banner, the plan, the steps, the closing table, a failure | `report.rs` |
+//! | how often a line is worth saying | `progress.rs` |
+//! | the log itself | `log.rs` |
+
+pub mod log;
+pub mod progress;
+pub mod report;

@@ -1,0 +1,17 @@
+//! What a run tells about itself while it goes on.
+//!
+//! | idea | file | source |
+//! |---|---|---|
+//! | rows, frames, summary | `recorder.rs` | |
+//! | energies and momenta | `ledger.rs` | Ghost §5.2 |
+//! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
+//! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
+//! | wall time by phase | `clock.rs` | |
+//! | checkpoints and restarts | `checkpointing.rs` | |
+
+pub mod checkpointing;
+pub mod clock;
+pub mod ledger;
+pub mod reactions;
+pub mod recorder;
+pub mod verify;

@@ -1,0 +1,473 @@
+//! What a running analysis leaves behind: rows, frames, progress and the summary.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use crate::deck::Deck;
+use crate::deck::model::{AnalysisType, Every};
+use crate::error::{Error, Result};
+use crate::output::directory::ResultsDirectory;
+use crate::output::extent::{body_summaries, peak_memory};
+use crate::output::restart::run_state::RunState;
+use crate::output::series::grid_file::{GridFrame, GridSeries};
+use crate::output::series::point_field::PointField;
+use crate::output::series::points_file::PointsSeries;
+use crate::output::summary::Summary;
+use crate::output::summary::{BalanceReport, Communication, Count, Status};
+use crate::output::tables::csv_table::Mark;
+use crate::output::tables::history::History;
+use crate::output::tables::history::{HistoryRow, Layout};
+use crate::output::tables::residuals::Residuals;
+use crate::output::terminal::log::Log;
+use crate::output::terminal::progress::{NewtonReport, Progress, StepReport};
+use crate::parallel::World;
+use crate::points::Points;
+use crate::system::numbering::Numbering;
+
+use super::checkpointing::Checkpointer;
+use super::clock::Clock;
+use crate::analysis::load_steps::Moment;
+use crate::system::step_system::{Discretisation, Model};
+
+/// Open files and running totals of one run.
+pub struct Recorder {
+    pub log: Log,
+    directory: ResultsDirectory,
+    history: History,
+    residuals: Residuals,
+    points: PointsSeries,
+    grid: GridSeries,
+    progress: Progress,
+    every: Every,
+    last_frame: f64,
+    steps: Option<usize>,
+    pub newton: Count,
+    pub linear: Count,
+    pub steps_completed: usize,
+    /// The last solve failed as its residual no longer fell.
+    pub stuck_at_round_off: bool,
+    /// The last step with a row in the history.
+    recorded: usize,
+    /// Those of them before a restart.
+    earlier_steps: usize,
+    /// Load factor and time (s) reached so far.
+    pub reached: (f64, f64),
+    pub versions: BTreeMap<String, String>,
+    populated_cells: usize,
+    imbalance: f64,
+    balance: BalanceReport,
+    checkpointer: Checkpointer,
+    resumed: Option<RunState>,
+    /// [`Resume::same_directory`]; false without a restart.
+    same_directory: bool,
+    /// s that earlier parts of the run took.
+    earlier_seconds: f64,
+    /// s up to the last row, earlier parts included.
+    seconds: f64,
+}
+
+/// What a restart hands to the recorder.
+pub struct Resume {
+    pub state: RunState,
+    /// Where it was read, and the step at whose end it was written.
+    pub checkpoint: PathBuf,
+    pub step: usize,
+    /// The results directory is that of the earlier part: its tables and series go on.
+    pub same_directory: bool,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone)]
+pub struct Ending {
+    pub status: Status,
+    pub reason: String,
+    /// A signal asked for it.
+    pub on_request: bool,
+}
+
+impl Ending {
+    pub fn completed() -> Self {
+        Ending { status: Status::Completed, reason: String::new(), on_request: false }
+    }
+
+    /// The run could not go on but keeps what it has.
+    pub fn stopped(reason: String) -> Self {
+        Ending { status: Status::Stopped, reason, on_request: false }
+    }
+
+    pub fn failed(reason: String) -> Self {
+        Ending { status: Status::Failed, reason, on_request: false }
+    }
+}
+
+impl Recorder {
+    /// The files of a results directory: fresh ones, or those of the run that is resumed, which are
+    /// read and tested. Nothing is written before [`Self::open`].
+    pub fn create(
+        world: &World,
+        deck: &Deck,
+        directory: ResultsDirectory,
+        mut log: Log,
+        versions: BTreeMap<String, String>,
+        checkpointer: Checkpointer,
+        resume: Option<Resume>,
+    ) -> Result<Self> {
+        let comm = world.comm();
+        let layout = Layout {
+            dimension: deck.dimension,
+            boundaries: deck.boundaries.iter().map(|boundary| boundary.name.clone()).collect(),
+            conditioning: deck.analysis.kind == AnalysisType::Conditioning,
+        };
+        let fields = PointField::parse_list(&deck.output.fields)?;
+        let (basis, dimension) = (deck.method.basis, deck.dimension);
+        let goes_on = resume.as_ref().filter(|resume| resume.same_directory);
+        let (history, residuals, points, grid) = match goes_on {
+            None => (
+                History::create(&directory, layout)?,
+                Residuals::create(&directory)?,
+                PointsSeries::create(&directory, &fields, basis, dimension),
+                GridSeries::create(&directory),
+            ),
+            Some(Resume { state, .. }) => {
+                let count = |name: &str| state.count(name).map(|n| n as usize);
+                let step = count("recorder.steps")?;
+                let mark = |table: &str| -> Result<Mark> {
+                    let rows = count(&format!("recorder.{table}_rows"))?;
+                    // Not known to the first checkpoints of this format.
+                    let step = count(&format!("recorder.{table}_step")).unwrap_or(usize::MAX);
+                    Ok(Mark { rows, step })
+                };
+                let (history, residuals) = (mark("history")?, mark("residual")?);
+                (
+                    History::resume(&directory, layout, history, &mut log, comm)?,
+                    Residuals::resume(&directory, residuals, &mut log, comm)?,
+                    PointsSeries::resume(&directory, &fields, basis, dimension, step, comm)?,
+                    GridSeries::resume(&directory, step, comm)?,
+                )
+            }
+        };
+        let same_directory = goes_on.is_some();
+        let mut recorder = Recorder {
+            log,
+            history,
+            residuals,
+            points,
+            grid,
+            directory,
+            progress: Progress::default(),
+            every: deck.output.every,
+            last_frame: 0.0,
+            steps: deck.analysis.steps,
+            newton: Count::default(),
+            linear: Count::default(),
+            steps_completed: 0,
+            stuck_at_round_off: false,
+            recorded: 0,
+            earlier_steps: 0,
+            reached: (0.0, 0.0),
+            versions,
+            populated_cells: 0,
+            imbalance: 1.0,
+            balance: BalanceReport::default(),
+            checkpointer,
+            resumed: None,
+            same_directory,
+            earlier_seconds: 0.0,
+            seconds: 0.0,
+        };
+        if let Some(Resume { state, .. }) = resume {
+            recorder.restore(&state)?;
+            recorder.resumed = Some(state);
+        }
+        Ok(recorder)
+    }
+
+    /// Opens the tables. Those of a run that is resumed, and its series, lose what came later: the
+    /// series first, as whoever looks at them looks for the newest frame.
+    pub fn open(&mut self, world: &World) -> Result<()> {
+        let comm = world.comm();
+        self.log.attach(&self.directory, self.same_directory, comm)?;
+        self.points.cut(comm)?;
+        self.grid.cut(comm)?;
+        self.history.table.open(comm)?;
+        self.residuals.table.open(comm)
+    }
+
+    /// What the time loop saved with [`Self::end_step`] before the run was interrupted; `None`
+    /// in a run that starts at the beginning.
+    pub fn resumed(&self) -> Option<&RunState> {
+        self.resumed.as_ref()
+    }
+
+    /// The last thing in a step, when points, mesh and partition are what the next step starts
+    /// from: writes a checkpoint if one is due, with the loop's own `state`. If a signal asks the
+    /// run to stop, says how it ends. Collective.
+    pub fn end_step<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        moment: Moment,
+        state: RunState,
+    ) -> Result<Option<Ending>> {
+        self.balance = model.balance.report();
+        let (due, signal) = self.checkpointer.due(world, self.steps_completed, moment);
+        if due || signal.is_some() {
+            self.checkpoint(world, model, points, state)?;
+        }
+        Ok(signal.filter(|_| moment != Moment::End).map(|signal| Ending {
+            status: Status::Stopped,
+            on_request: true,
+            reason: format!(
+                "{} asked the run to stop, after step {}{}; a checkpoint was written: go on with \
+                 --restart last",
+                signal.name(),
+                self.steps_completed,
+                self.steps.map_or(String::new(), |steps| format!(" of {steps}"))
+            ),
+        }))
+    }
+
+    /// A run that cannot go on leaves its last good state, if its deck plans checkpoints: with
+    /// other settings it may go on from there.
+    pub fn keep_last_state<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        state: RunState,
+    ) -> Result<()> {
+        if self.checkpointer.planned() {
+            let written = self.checkpoint(world, model, points, state);
+            return self.warn_of_files(written);
+        }
+        Ok(())
+    }
+
+    /// In a run that ends for another reason: that some file could not be written is a second
+    /// word, and does not take the place of the first.
+    pub fn warn_of_files(&mut self, written: Result<()>) -> Result<()> {
+        match written {
+            Err(Error::File(text)) => {
+                self.log.say(&format!("warning: {text}"));
+                Ok(())
+            }
+            other => other,
+        }
+    }
+
+    fn checkpoint<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        mut state: RunState,
+    ) -> Result<()> {
+        self.save(&mut state);
+        model.balance.save(&mut state);
+        // A checkpoint counts on its rows: they are to outlast a power cut if it does.
+        self.history.table.sync(world.comm())?;
+        self.residuals.table.sync(world.comm())?;
+        let step = self.steps_completed;
+        let path = self.checkpointer.write(world, step, model, points, &state)?;
+        self.log.note(&format!("checkpoint: {}", path.display()));
+        Ok(())
+    }
+
+    fn save(&self, state: &mut RunState) {
+        let (history, residuals) = (self.history.table.mark(), self.residuals.table.mark());
+        for (name, value) in [
+            ("recorder.steps", self.steps_completed),
+            ("recorder.history_rows", history.rows),
+            ("recorder.history_step", history.step),
+            ("recorder.residual_rows", residuals.rows),
+            ("recorder.residual_step", residuals.step),
+            ("recorder.newton_total", self.newton.total),
+            ("recorder.newton_max", self.newton.max),
+            ("recorder.linear_total", self.linear.total),
+            ("recorder.linear_max", self.linear.max),
+            ("recorder.populated_cells", self.populated_cells),
+        ] {
+            state.set_count(name, value as u64);
+        }
+        state.set("recorder.last_frame", self.last_frame);
+        state.set("recorder.imbalance", self.imbalance);
+        state.set("recorder.seconds", self.seconds);
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        let count = |name: &str| state.count(name).map(|n| n as usize);
+        self.steps_completed = count("recorder.steps")?;
+        self.earlier_steps = self.steps_completed;
+        self.recorded = self.steps_completed;
+        self.newton =
+            Count { total: count("recorder.newton_total")?, max: count("recorder.newton_max")? };
+        self.linear =
+            Count { total: count("recorder.linear_total")?, max: count("recorder.linear_max")? };
+        self.populated_cells = count("recorder.populated_cells")?;
+        self.last_frame = state.number("recorder.last_frame")?;
+        self.imbalance = state.number("recorder.imbalance")?;
+        self.earlier_seconds = state.number("recorder.seconds")?;
+        self.seconds = self.earlier_seconds;
+        Ok(())
+    }
+
+    pub fn directory(&self) -> PathBuf {
+        self.directory.path().to_path_buf()
+    }
+
+    /// Records one accepted step (or part of one): a row and a line.
+    pub fn step(&mut self, world: &World, row: &HistoryRow, with_newton: bool) -> Result<()> {
+        self.seconds = self.earlier_seconds + row.wall_seconds;
+        let whole_run = HistoryRow { wall_seconds: self.seconds, ..row.clone() };
+        self.history.push(&whole_run, world.comm())?;
+        self.recorded = row.step;
+        self.reached = (row.load_factor, row.time);
+        self.populated_cells = row.populated_cells;
+        self.imbalance = row.imbalance;
+        let newton = with_newton.then_some(NewtonReport {
+            iterations: row.newton_iterations,
+            residual: row.residual,
+            linear_iterations: row.linear_iterations,
+            cuts: row.cuts,
+        });
+        let report = StepReport {
+            step: row.step,
+            steps: self.steps,
+            share: row.load_factor,
+            time: (row.time > 0.0).then_some(row.time),
+            newton,
+            elapsed: row.wall_seconds,
+        };
+        self.progress.step(&mut self.log, &report);
+        Ok(())
+    }
+
+    /// A step that could be solved but not written is not a completed one.
+    pub fn leave_unrecorded(&mut self) {
+        self.steps_completed = self.steps_completed.min(self.recorded);
+    }
+
+    /// Residuals of a step's evaluations.
+    pub fn iterations(&mut self, world: &World, step: usize, errors: &[f64]) -> Result<()> {
+        self.residuals.push_step(step, errors, world.comm())
+    }
+
+    /// True if the deck wants a frame at the end of this step.
+    pub fn wants_frame(&mut self, step: usize, time: f64, last: bool) -> bool {
+        match self.every {
+            Every::Steps(every) => last || step.is_multiple_of(every.max(1)),
+            Every::Seconds(seconds) => {
+                let due = last || time >= self.last_frame + seconds * (1.0 - 1e-9);
+                if due {
+                    self.last_frame = time;
+                }
+                due
+            }
+        }
+    }
+
+    /// Writes the points.
+    pub fn frame<const D: usize>(
+        &mut self,
+        world: &World,
+        step: usize,
+        time: f64,
+        points: &Points<D>,
+    ) -> Result<()> {
+        self.points.write(step, time, points, world.comm())
+    }
+
+    /// Writes the active grid of the step just solved; vectors are per owned degree of freedom.
+    #[allow(clippy::too_many_arguments)]
+    pub fn grid_frame<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        mesh: &Discretisation<D>,
+        step: usize,
+        time: f64,
+        displacement: &[f64],
+        reaction: &[f64],
+    ) -> Result<()> {
+        let numbering: &Numbering = &mesh.numbering;
+        let per_node = |values: &[f64]| -> Vec<[f64; D]> {
+            values.chunks_exact(D).map(|v| std::array::from_fn(|a| v[a])).collect()
+        };
+        let owned = numbering.owned;
+        let coordinates: Vec<[f64; D]> =
+            numbering.nodes[..owned].iter().map(|&node| model.grid.node_position(node)).collect();
+        let mut cells = Vec::new();
+        let mut connectivity = Vec::new();
+        let mut nodes = Vec::new();
+        let on_face: std::collections::BTreeSet<usize> = mesh.ghost_cells.iter().copied().collect();
+        for &(cell, _) in &mesh.populated.owned {
+            nodes.clear();
+            model.grid.cell_nodes(cell, &mut nodes);
+            // A cell whose nodes this rank does not all know is written by nobody: it cannot
+            // happen, as owners of populated cells reach their nodes.
+            let numbers: Option<Vec<usize>> = nodes
+                .iter()
+                .map(|&node| numbering.local(node).map(|l| numbering.global[l] as usize))
+                .collect();
+            if let Some(numbers) = numbers {
+                connectivity.extend(numbers);
+                cells.push(on_face.contains(&cell));
+            }
+        }
+        let weights = mesh.node_weights(world)?;
+        let frame = GridFrame {
+            element: model.grid.element(),
+            coordinates: &coordinates,
+            connectivity: &connectivity,
+            displacement_increment: &per_node(&displacement[..owned * D]),
+            reaction: &per_node(reaction),
+            node_fields: &[("weight", &weights[..owned])],
+            ghost_boundary: &cells,
+            cell_fields: &[],
+        };
+        self.grid.write(step, time, &frame, world.comm())
+    }
+
+    /// Steps that this process has completed, without those before a restart.
+    pub fn steps_here(&self) -> usize {
+        self.steps_completed - self.earlier_steps
+    }
+
+    /// The summary, and whether it could be written. Collective.
+    #[allow(clippy::too_many_arguments)]
+    pub fn finish<const D: usize>(
+        &mut self,
+        world: &World,
+        deck: &Deck,
+        points: &Points<D>,
+        clock: &Clock,
+        communication: Communication,
+        verify: BTreeMap<String, f64>,
+        ending: &Ending,
+    ) -> (Summary, Result<()>) {
+        let bodies = body_summaries(points, deck.bodies.len(), deck.method.basis, world.comm());
+        let summary = Summary {
+            title: deck.title.clone(),
+            status: ending.status,
+            reason: ending.reason.clone(),
+            steps_completed: self.steps_completed,
+            steps_requested: self.steps.unwrap_or(self.steps_completed),
+            newton_iterations: self.newton,
+            linear_iterations: self.linear,
+            points: world.sum_usize(points.len()),
+            cells_populated: self.populated_cells,
+            ranks: world.size(),
+            wall_seconds: clock.phases(),
+            peak_memory_bytes: peak_memory(world.comm()),
+            imbalance: self.imbalance,
+            balance: self.balance,
+            communication,
+            verify,
+            bodies: deck.bodies.iter().map(|body| body.name.clone()).zip(bodies).collect(),
+            versions: self.versions.clone(),
+        };
+        let written = summary.write(&self.directory, world.comm());
+        (summary, written)
+    }
+}

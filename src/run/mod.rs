@@ -1,0 +1,15 @@
+//! A run from its command line to its exit code.
+//!
+//! | step | file |
+//! |---|---|
+//! | the stages of a run, in order | `session.rs` |
+//! | deck to points on their ranks | `setup.rs` |
+//! | what is checked before anything is written | `start_checks/` |
+//! | what the run will do, told ahead | `plan.rs` |
+//! | the process that MPI starts | `process.rs` |
+
+pub mod plan;
+pub mod process;
+pub mod session;
+pub mod setup;
+pub mod start_checks;

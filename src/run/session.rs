@@ -1,0 +1,300 @@
+//! From the command line to a finished results directory: what happens on every rank.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::io::Write as _;
+
+use mpi::environment::Universe;
+use mpi::traits::*;
+
+use crate::cli::{self, Arguments};
+use crate::deck::model::AnalysisType;
+use crate::deck::{self, Deck};
+use crate::error::{Error, Result};
+use crate::output::directory::ResultsDirectory;
+use crate::output::restart::run_lock::RunLock;
+use crate::output::start;
+use crate::output::summary::Status;
+use crate::output::terminal::log::Log;
+use crate::output::terminal::report::{self, Banner, Failure};
+use crate::parallel::{World, signals};
+use crate::petsc::log::Stages;
+use crate::petsc::{self, Session};
+use crate::petsc::{files, known};
+
+use super::start_checks::formulas;
+use super::start_checks::support;
+use super::{plan, process, setup};
+use crate::analysis::{conditioning, explicit, implicit_dynamic};
+use crate::analysis::{quasi_static, solver};
+use crate::parallel::balance;
+use crate::record::checkpointing::{self, Checkpointer};
+use crate::record::clock::Clock;
+use crate::record::recorder::{Ending, Recorder, Resume};
+use crate::system::step_system;
+
+/// Runs the program with the words of its command line (the program's name first); returns the
+/// exit code, the same on all ranks.
+pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
+    process::before_start();
+    start::before_mpi();
+    let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
+        eprintln!("error: MPI could not be started");
+        return Error::Environment(String::new()).exit_code();
+    };
+    petsc::install_panic_hook();
+    let world = World::new(universe.world().duplicate());
+    let outcome = cli::parse(words).and_then(|arguments| match &arguments.print {
+        Some(text) => {
+            if world.is_root() {
+                println!("{}", text.trim_end());
+            }
+            Ok(())
+        }
+        None => with_world(&universe, &world, &arguments),
+    });
+    match outcome {
+        Ok(()) => 0,
+        Err(error) => {
+            if world.is_root() {
+                // The disk that is full may be the one where this goes, too.
+                let _ = writeln!(std::io::stderr(), "error: {}", error.to_string().trim_end());
+            }
+            error.exit_code()
+        }
+    }
+}
+
+/// Errors that reach this level are the same on every rank.
+fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Result<()> {
+    let text = read_deck_text(world, arguments)?;
+    let deck = world.fail_together(deck::read(&arguments.input, &text, &arguments.sets))?;
+    let session = Session::start(universe, &deck.petsc, &arguments.petsc)?;
+    world.fail_together(known::require_known())?;
+    files::require_writable(world.comm())?;
+    let mut log = Log::new(world.comm());
+    let versions = versions();
+    log.say(&report::banner(&Banner {
+        version: env!("CARGO_PKG_VERSION").into(),
+        ranks: world.size(),
+        libraries: versions.clone().into_iter().collect(),
+    }));
+    let run = Run { world, session: &session, arguments, text, versions, log };
+    match deck.dimension {
+        2 => run.in_space::<2>(deck),
+        _ => run.in_space::<3>(deck),
+    }
+}
+
+/// Rank 0 reads; the others hear.
+fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
+    let path = &arguments.input;
+    let read = if world.is_root() {
+        std::fs::read(path).map_err(|reason| {
+            Error::Input(format!("cannot read the deck {}: {reason}", path.display()))
+        })
+    } else {
+        Ok(Vec::new())
+    };
+    let mut bytes = world.fail_together(read)?;
+    world.broadcast_bytes(0, &mut bytes);
+    String::from_utf8(bytes)
+        .map_err(|_| Error::Input(format!("{} is not UTF-8 text", path.display())))
+}
+
+fn versions() -> BTreeMap<String, String> {
+    let mpi = mpi::environment::library_version().unwrap_or_default();
+    let mpi = mpi.split(',').next().unwrap_or_default().trim().to_string();
+    BTreeMap::from([
+        ("mpm-par".to_string(), env!("CARGO_PKG_VERSION").to_string()),
+        ("PETSc".to_string(), petsc::version()),
+        ("MPI".to_string(), mpi),
+        ("HDF5".to_string(), {
+            let (major, minor, patch) = hdf5::library_version();
+            format!("{major}.{minor}.{patch}")
+        }),
+    ])
+}
+
+/// What a run knows before its dimension.
+struct Run<'a> {
+    world: &'a World,
+    session: &'a Session<'a>,
+    arguments: &'a Arguments,
+    text: String,
+    versions: BTreeMap<String, String>,
+    log: Log,
+}
+
+impl Run<'_> {
+    fn in_space<const D: usize>(mut self, deck: Deck) -> Result<()> {
+        let world = self.world;
+        let mut clock = Clock::new(Some(Stages::register()?));
+        let resolved = deck::resolved(&deck);
+        let physics = checkpointing::physics_of(world, &deck)?;
+        let (out, comm) = (&self.arguments.out, world.comm());
+        let mut lock = RunLock::of(out);
+        if !self.arguments.check {
+            // Before a checkpoint is chosen: the run that has the directory may be writing one.
+            lock.take(false, &mut self.log, comm)?;
+        }
+        let (mut model, mut points, resume) = match &self.arguments.restart {
+            None => {
+                let (model, points) = setup::prepare::<D>(world, deck)?;
+                (model, points, None)
+            }
+            Some(choice) => {
+                let found = checkpointing::find::<D>(world, &physics, choice, out, &mut self.log)?;
+                self.log.say(&report::restart(&found.path, found.step, found.ranks, world.size()));
+                let resume = Resume {
+                    state: found.state.clone(),
+                    checkpoint: found.path.clone(),
+                    step: found.step,
+                    same_directory: checkpointing::lies_in(world, &found.path, out),
+                };
+                let (mut model, points) = setup::restore(world, deck, found)?;
+                model.balance.restore(&resume.state)?;
+                (model, points, Some(resume))
+            }
+        };
+        let active = step_system::active(world, &model, &points);
+        let active = active.map_err(|error| match error {
+            // Before any step it is the deck that puts a domain there.
+            Error::Run(text) if resume.is_none() => Error::Input(format!("at the start {text}")),
+            other => other,
+        })?;
+        let warnings = match resume {
+            None => formulas::check(world, &model, &points, &active.1)?,
+            Some(_) => Vec::new(),
+        };
+        if resume.is_none() && model.deck.analysis.kind == AnalysisType::QuasiStatic {
+            let first = quasi_static::first_span(&model.deck);
+            support::require(world, &model, &points, &active, first)?;
+        }
+        let plan = plan::of(world, &model, &points, &active);
+        self.log.say(&report::plan(&plan));
+        warnings.iter().for_each(|warning| self.log.say(warning));
+        drop(active);
+        solver::rehearse(world, &model, plan.equations)?;
+        if self.arguments.check {
+            self.log.say("The deck is good; nothing was run (--check).");
+            return Ok(());
+        }
+        lock.take(true, &mut self.log, comm)?;
+        let earlier = resume.as_ref().filter(|resume| resume.same_directory);
+        let earlier = earlier.map(|resume| (resume.checkpoint.clone(), resume.step));
+        let directory = match earlier {
+            Some(_) => ResultsDirectory::reopen(out, comm)?,
+            None => ResultsDirectory::create(out, self.arguments.force, comm)?,
+        };
+        let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
+        let (log, versions, into) = (self.log, self.versions, directory.clone());
+        let mut recorder =
+            Recorder::create(world, &model.deck, into, log, versions, checkpointer, resume)?;
+        // All of the earlier part is known to fit: now it may be changed.
+        if let (Some((used, step)), Some(choice)) = (earlier, &self.arguments.restart) {
+            checkpointing::set_later_aside(world, out, choice, &used, step)?;
+            directory.leave_earlier_part(comm)?;
+        }
+        directory.write_decks(&self.text, &resolved, comm)?;
+        recorder.open(world)?;
+        signals::listen();
+        process::before_steps();
+        clock.end_setup();
+
+        let outcome = match model.deck.analysis.kind {
+            AnalysisType::QuasiStatic => {
+                quasi_static::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::Explicit => {
+                explicit::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::Conditioning => {
+                conditioning::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+            AnalysisType::ImplicitDynamic => {
+                implicit_dynamic::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+            }
+        };
+        let mut of_numerics = true;
+        let (ending, kind): (_, fn(String) -> Error) = match outcome {
+            Ok(ending) => (ending, Error::Run),
+            Err(error) => {
+                let of_files = error.exit_code() == 3;
+                of_numerics = error.exit_code() == 1;
+                let kind = match error.exit_code() {
+                    3 => Error::File,
+                    4 => Error::Environment,
+                    _ => Error::Run,
+                };
+                if of_files {
+                    recorder.leave_unrecorded();
+                }
+                let (text, step) = (error.to_string(), recorder.steps_completed + 1);
+                // A file has its step in its name.
+                let named = of_files || text.starts_with("step ");
+                let text = if named { text } else { format!("step {step}: {text}") };
+                (Ending::failed(text), kind)
+            }
+        };
+        let figures = quasi_static::figures(world, &model, &points, &mut recorder)?;
+        let (traffic, steps) = (clock.traffic(), recorder.steps_here());
+        let sent = balance::communication(world, &model, traffic, steps);
+        let (summary, written) =
+            recorder.finish(world, &model.deck, &points, &clock, sent, figures, &ending);
+        let (ending, kind): (_, fn(String) -> Error) = match written {
+            Err(error) if ending.status == Status::Completed => {
+                (Ending::failed(error.to_string()), Error::File)
+            }
+            // What happened first is what the run is to say.
+            written => {
+                recorder.warn_of_files(written)?;
+                (ending, kind)
+            }
+        };
+        recorder.log.say(&report::closing(&summary, &recorder.directory()));
+        let unused = self.session.unused_options()?;
+        if !unused.is_empty() {
+            recorder
+                .log
+                .say(&format!("warning: PETSc options that nothing used: {}", unused.join(", ")));
+        }
+        if ending.status == Status::Completed {
+            return Ok(());
+        }
+        let failure = Failure {
+            what: ending.reason.clone(),
+            last_good_step: Some(recorder.steps_completed),
+            results: Some(recorder.directory()),
+            // Whoever sent a signal needs no advice, and no numerics heals a deck, a full disk or an
+            // option that PETSc refuses.
+            advice: match kind(String::new()).exit_code() {
+                _ if ending.on_request => Vec::new(),
+                3 => vec![checkpointing::advice(world, &recorder.directory())],
+                _ if !of_numerics => Vec::new(),
+                _ if recorder.stuck_at_round_off => {
+                    vec!["raise analysis.tolerance: the residual no longer falls".into()]
+                }
+                _ => advice(&model.deck),
+            },
+            ..Failure::default()
+        };
+        Err(kind(report::failure(&failure)))
+    }
+}
+
+/// What usually helps when a step cannot be solved, given what the deck does not yet use.
+fn advice(deck: &Deck) -> Vec<String> {
+    let mut advice = Vec::new();
+    if matches!(deck.analysis.kind, AnalysisType::Explicit | AnalysisType::Conditioning) {
+        return vec!["smaller steps: analysis.steps, or analysis.cfl = 0.5 in its place".into()];
+    }
+    if deck.ghost.as_ref().is_none_or(|g| g.stiffness.is_none() && g.stiffness_factor.is_none()) {
+        advice.push("stabilise small overlaps: [ghost] stiffness_factor = 1.0".to_string());
+    }
+    if deck.analysis.on_failure == crate::deck::model::OnFailure::Stop {
+        advice.push("let steps be cut: analysis.on_failure = \"cut\"".to_string());
+    }
+    advice.push("more, smaller steps: analysis.steps".to_string());
+    advice
+}

@@ -1,0 +1,208 @@
+//! From a checked deck to points on their ranks: seed, partition, migrate, place point forces;
+//! or the same from a checkpoint.
+
+use crate::deck::model::{self, Initial, Load};
+use crate::deck::{Deck, rough};
+use crate::error::{Error, Result};
+use crate::ghost::stencil::Penalty;
+use crate::grid::{Grid, Lattice, Mesh};
+use crate::loads::manufactured::Manufactured;
+use crate::material::Material;
+use crate::output::restart::checkpoint::Restored;
+use crate::parallel::{self, Partition, World};
+use crate::points::Points;
+use crate::points::seed::{self, CellByCell};
+use crate::points::share::Share;
+
+use super::start_checks::memory;
+use crate::parallel::balance::Balance;
+use crate::system::step_system::Model;
+
+/// Builds the model and this rank's points. Collective.
+pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {
+    memory::require::<D>(world, &deck)?;
+    let grid = world.fail_together(build_grid(&deck))?;
+    check_tags(&deck, &grid)?;
+    let share = Share { rank: world.rank(), ranks: world.size() };
+    let (mut points, first_ids) = world.fail_together(seed::seed(&deck, &grid, share))?;
+    let cells = check_bodies(world, &deck, &grid, &points)?;
+    let brick = deck.parallel.brick;
+    let partition = match deck.parallel.initial {
+        Initial::Balanced => Partition::for_cells(world, &grid, brick, &cells, None)?,
+        Initial::Slabs => Partition::slabs(world, &grid, brick, &cells)?,
+    };
+    let seeding = CellByCell::new(&deck, &grid, first_ids)?;
+    parallel::settle(world, &partition, &grid, &mut points, cells, &seeding)?;
+    place_point_forces(world, &deck, &grid, &mut points)?;
+    Ok((model_of(deck, grid, partition)?, points))
+}
+
+/// The model and this rank's points as a checkpoint holds them: the stored partition where it
+/// fits this run, a new one otherwise. Collective.
+pub fn restore<const D: usize>(
+    world: &World,
+    deck: Deck,
+    restored: Restored<D>,
+) -> Result<(Model<D>, Points<D>)> {
+    let mut grid = world.fail_together(build_grid(&deck))?;
+    let Restored { ranks, mut points, mesh_positions, brick, owners, .. } = restored;
+    points.shed(deck.method.basis);
+    if let (Grid::Mesh(mesh), Some(positions)) = (&mut grid, mesh_positions) {
+        world.fail_together(mesh.set_positions(positions))?;
+    }
+    let unchanged = ranks == world.size() && (deck.parallel.brick.is_none_or(|b| Some(b) == brick));
+    let stored = unchanged.then(|| Partition::restore(&grid, brick, owners, ranks)).flatten();
+    let partition = match stored {
+        Some(partition) => partition,
+        None => Partition::build(world, &grid, deck.parallel.brick, &points, None)?,
+    };
+    // With the stored partition nothing moves; the points are in the order of their cells.
+    parallel::migrate(world, &partition, &grid, &mut points)?;
+    Ok((model_of(deck, grid, partition)?, points))
+}
+
+/// Materials and everything else that follows from the deck alone.
+fn model_of<const D: usize>(
+    deck: Deck,
+    grid: Grid<D>,
+    partition: Partition<D>,
+) -> Result<Model<D>> {
+    let materials = deck
+        .bodies
+        .iter()
+        .map(|body| Material::from_deck(&deck.materials[body.material].model))
+        .collect();
+    let penalties = deck
+        .bodies
+        .iter()
+        .map(|body| {
+            let young = deck.materials[body.material].model.young();
+            deck.ghost.as_ref().map_or(Penalty { stiffness: 0.0, mass: 0.0 }, |ghost| {
+                Penalty::of_body(ghost, young, body.density)
+            })
+        })
+        .collect();
+    let field = deck.loads.iter().find_map(|load| match load {
+        Load::Manufactured(field) => Some(field),
+        _ => None,
+    });
+    let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
+    let balance = Balance::default();
+    Ok(Model { deck, grid, partition, materials, penalties, manufactured, balance })
+}
+
+/// The grid that a deck asks for.
+pub fn build_grid<const D: usize>(deck: &Deck) -> Result<Grid<D>> {
+    match &deck.grid {
+        model::Grid::Lattice(lattice) => {
+            let axis = |values: &[f64]| std::array::from_fn(|a| values[a]);
+            Ok(Grid::Lattice(Lattice {
+                origin: axis(&lattice.origin),
+                spacing: axis(&lattice.spacing),
+                cells: std::array::from_fn(|a| lattice.cells[a]),
+            }))
+        }
+        model::Grid::Mesh(mesh) => Ok(Grid::Mesh(Mesh::build(&mesh.source)?)),
+    }
+}
+
+/// Every boundary's tag names nodes of the mesh.
+fn check_tags<const D: usize>(deck: &Deck, grid: &Grid<D>) -> Result<()> {
+    for boundary in &deck.boundaries {
+        if let model::Place::Tag(tag) = &boundary.place {
+            grid.tagged_nodes(tag)?;
+        }
+    }
+    Ok(())
+}
+
+/// Every body has points, all inside the grid; returns their cells.
+fn check_bodies<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    grid: &Grid<D>,
+    points: &Points<D>,
+) -> Result<Vec<usize>> {
+    let mut counts = vec![0.0; deck.bodies.len()];
+    for &body in &points.body {
+        counts[body as usize] += 1.0;
+    }
+    for (body, count) in deck.bodies.iter().zip(world.sum_slice(&counts)) {
+        if count == 0.0 {
+            return Err(Error::Input(format!(
+                "body \"{}\" has no points: its shape holds no point of its seeding inside the \
+                 grid; check shape, units and points_per_cell",
+                body.name
+            )));
+        }
+    }
+    let cells: Vec<usize> =
+        grid.locate_each(points.position.iter()).map_while(|cell| cell).collect();
+    let outside = (cells.len() < points.len()).then(|| {
+        let p = cells.len();
+        format!(
+            "body \"{}\": point {} at {:?} lies outside the grid; enlarge the grid or move the body",
+            deck.bodies[points.body[p] as usize].name, points.id[p], points.position[p]
+        )
+    });
+    match world.first_message(outside) {
+        Some(message) => Err(Error::Input(message)),
+        None => Ok(cells),
+    }
+}
+
+/// Shares each point load equally among the points nearest to its places; of points equally
+/// near (to 1e-9 of the distance scale) the one with the smallest id takes it. Error: a place further
+/// from all points than the diagonal of a cell and half that of the point's domain.
+fn place_point_forces<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    grid: &Grid<D>,
+    points: &mut Points<D>,
+) -> Result<()> {
+    for (index, load) in deck.loads.iter().enumerate() {
+        let Load::Point { body, nearest, force } = load else { continue };
+        for place in nearest {
+            let distance = |p: usize| -> f64 {
+                let x = &points.position_initial[p];
+                x.iter().zip(place).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
+            };
+            let own: Vec<usize> =
+                (0..points.len()).filter(|&p| points.body[p] as usize == *body).collect();
+            let best = world.min(own.iter().map(|&p| distance(p)).fold(f64::INFINITY, f64::min));
+            let slack = 1e-9 * own.first().map_or(0.0, |&p| points.half_length_initial[p][0]);
+            let id = own
+                .iter()
+                .filter(|&&p| distance(p) <= best + slack)
+                .map(|&p| points.id[p])
+                .min()
+                .unwrap_or(u64::MAX);
+            let id = world.min_u64(id);
+            let found = (0..points.len()).find(|&p| points.id[p] == id);
+            let far = found.and_then(|p| {
+                let half = points.half_length_initial[p].iter().copied().fold(0.0, f64::max);
+                let reach = (D as f64).sqrt() * (grid.cell_size() + half);
+                (best > reach).then(|| {
+                    format!(
+                        "{place:?} m is {} m away from the nearest point of body \"{}\", which is \
+                         at {:?} m; expected a place within a cell of it ({} m)",
+                        rough(best),
+                        deck.bodies[*body].name,
+                        points.position_initial[p],
+                        rough(reach)
+                    )
+                })
+            });
+            if let Some(message) = world.first_message(far) {
+                let key = format!("load.{index}.point.nearest");
+                return Err(Error::Input(deck.places.say(&key, &message)));
+            }
+            if let Some(p) = found {
+                for (held, f) in points.point_force[p].iter_mut().zip(force) {
+                    *held += f / nearest.len() as f64;
+                }
+            }
+        }
+    }
+    Ok(())
+}

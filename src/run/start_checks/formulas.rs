@@ -1,0 +1,204 @@
+//! What the state at the start shows of a deck: formulas without a value there, and conditions that
+//! act on nothing. Found before anything is solved or written.
+
+use crate::deck::figure;
+use crate::deck::model::{AnalysisType, Deck, Load, Place};
+use crate::deck::schema::AXES;
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::loads::point_forces::scope_of;
+use crate::parallel::World;
+use crate::points::Points;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::numbering::Numbering;
+
+use crate::analysis::quasi_static;
+use crate::system::step_system::Model;
+
+/// Evaluates initial velocities, and loads and boundaries at both ends of the first step, at all
+/// points and nodes. Returns warnings. Errors name the key, its line and a point. Collective.
+pub fn check<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    numbering: &Numbering,
+) -> Result<Vec<String>> {
+    let span = first_span(&model.deck);
+    velocities(world, &model.deck, points)?;
+    if model.deck.analysis.kind != AnalysisType::Conditioning {
+        loads(world, model, points, span)?;
+    }
+    boundaries(world, model, points, numbering, span)
+}
+
+/// The first step; with a step that follows the stability limit only its begin is known.
+fn first_span(deck: &Deck) -> StepSpan {
+    let span = quasi_static::first_span(deck);
+    match (deck.analysis.steps, deck.analysis.duration) {
+        (Some(_), Some(duration)) => StepSpan { time_end: span.factor_end * duration, ..span },
+        (None, _) => StepSpan { factor_end: 0.0, ..span },
+        _ => span,
+    }
+}
+
+fn velocities<const D: usize>(world: &World, deck: &Deck, points: &Points<D>) -> Result<()> {
+    let fault = |p: usize| (0..D).find(|&a| !points.velocity[p][a].is_finite());
+    let message = of_first_point(world, points, fault, |p, axis| {
+        deck.places.say(
+            &format!("body.{}.velocity", points.body[p]),
+            &format!(
+                "{} is {} m/s at {}: the expression is not finite there",
+                AXES[axis],
+                points.velocity[p][axis],
+                place(points, p)
+            ),
+        )
+    });
+    message.map_or(Ok(()), |message| Err(Error::Input(message)))
+}
+
+fn loads<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    span: StepSpan,
+) -> Result<()> {
+    let (deck, kind) = (&model.deck, model.deck.analysis.kind);
+    let ends = [(span.factor_start, span.time_start), (span.factor_end, span.time_end)];
+    for (index, load) in deck.loads.iter().enumerate() {
+        let message = match load {
+            Load::Point { .. } | Load::Gravity(_) => None,
+            Load::BodyForce(force) => {
+                let fault = |p: usize| {
+                    ends.into_iter().find_map(|(s, t)| {
+                        let scope = scope_of(points, p, s, t);
+                        let values = force.iter().map(|f| f.value(&scope)).enumerate();
+                        let (axis, value) = values.into_iter().find(|(_, f)| !f.is_finite())?;
+                        Some((axis, value, s, t))
+                    })
+                };
+                of_first_point(world, points, fault, |p, (axis, value, s, t)| {
+                    let t = if kind.has_time() { format!(", t = {t} s") } else { String::new() };
+                    deck.places.say(
+                        &format!("load.{index}.body_force"),
+                        &format!(
+                            "{} is {value} N/m3 at {}, s = {s}{t}: the expression is not finite \
+                             there",
+                            AXES[axis],
+                            place(points, p)
+                        ),
+                    )
+                })
+            }
+            Load::Manufactured(_) => {
+                let Some(field) = &model.manufactured else { continue };
+                let fault = |p: usize| {
+                    ends.into_iter().find(|&(s, t)| {
+                        let material = &model.materials[points.body[p] as usize];
+                        let force = field.force::<D>(material, &scope_of(points, p, s, t));
+                        !force.is_ok_and(|force| force.iter().all(|f| f.is_finite()))
+                    })
+                };
+                of_first_point(world, points, fault, |p, (s, t)| {
+                    let material = &model.materials[points.body[p] as usize];
+                    let why = match field.force::<D>(material, &scope_of(points, p, s, t)) {
+                        Err(why) => why.to_string(),
+                        Ok(force) => format!(
+                            "the force is {force:?} N/m3 at {}, s = {s}: not finite",
+                            place(points, p)
+                        ),
+                    };
+                    deck.places.say(&format!("load.{index}.manufactured"), &why)
+                })
+            }
+        };
+        if let Some(message) = message {
+            return Err(Error::Input(message));
+        }
+    }
+    Ok(())
+}
+
+fn boundaries<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    numbering: &Numbering,
+    span: StepSpan,
+) -> Result<Vec<String>> {
+    let (deck, grid) = (&model.deck, &model.grid);
+    let mut warnings = Vec::new();
+    for (index, boundary) in deck.boundaries.iter().enumerate() {
+        if let Place::Box { min, max } = &boundary.place
+            && let Some(why) = without_nodes(grid, min, max)
+        {
+            let key = format!("boundary.{index}.where.box");
+            return Err(Error::Input(deck.places.say(&key, &why)));
+        }
+        let alone = std::slice::from_ref(boundary);
+        let basis = deck.method.basis;
+        let found = Conditions::evaluate(world, grid, basis, numbering, points, alone, span);
+        let found = found.map_err(|error| match error {
+            Error::Input(text) => {
+                Error::Input(deck.places.say(&format!("boundary.{index}.displacement"), &text))
+            }
+            other => other,
+        })?;
+        if world.sum_usize(found.members[0].len()) == 0 {
+            warnings.push(format!(
+                "warning: boundary \"{}\" acts on nothing at the start: no node of it touches a \
+                 cell that holds material",
+                boundary.name
+            ));
+        }
+    }
+    Ok(warnings)
+}
+
+/// Why a box holds no node of the grid, if it holds none.
+fn without_nodes<const D: usize>(grid: &Grid<D>, min: &[f64], max: &[f64]) -> Option<String> {
+    let slack = 1e-9 * grid.cell_size();
+    let Grid::Lattice(lattice) = grid else {
+        let inside = |node: usize| {
+            let x = grid.node_position_initial(node);
+            (0..D).all(|a| x[a] >= min[a] - slack && x[a] <= max[a] + slack)
+        };
+        let none = !(0..grid.node_count()).any(inside);
+        return none.then(|| "holds no node of the mesh".to_string());
+    };
+    (0..D).find_map(|a| {
+        let cells = lattice.cells[a] as f64;
+        let first = lattice.scaled(a, min[a] - slack).ceil().max(0.0);
+        let last = lattice.scaled(a, max[a] + slack).floor().min(cells);
+        if first <= last {
+            return None;
+        }
+        let plane = |at: f64| lattice.origin[a] + lattice.spacing[a] * at.clamp(0.0, cells);
+        let (below, above) = (plane(first - 1.0), plane(first));
+        let near = if below == above {
+            figure(below)
+        } else {
+            format!("{} and {}", figure(below), figure(above))
+        };
+        let (name, from, to) = (AXES[a], figure(min[a]), figure(max[a]));
+        Some(format!(
+            "holds no node of the grid: none has {name} from {from} to {to} m; nearest: {near} m"
+        ))
+    })
+}
+
+/// Whom `say` tells of the point with the lowest id that has a fault, on all ranks. Collective.
+fn of_first_point<const D: usize, F>(
+    world: &World,
+    points: &Points<D>,
+    fault: impl Fn(usize) -> Option<F>,
+    say: impl Fn(usize, F) -> String,
+) -> Option<String> {
+    let faulty = (0..points.len()).filter_map(|p| Some((points.id[p], p, fault(p)?)));
+    let own = faulty.min_by_key(|(id, ..)| *id);
+    world.lowest_message(own.map(|(id, p, fault)| (id, say(p, fault))))
+}
+
+fn place<const D: usize>(points: &Points<D>, p: usize) -> String {
+    format!("point {} at {:?} m", points.id[p], points.position[p])
+}

@@ -1,0 +1,208 @@
+//! Do the conditions hold every connected piece of the material against rigid motion? Found before
+//! anything is solved or written: a quasi-static system that a rigid motion solves is singular.
+
+use std::collections::BTreeMap;
+
+use nalgebra::DMatrix;
+
+use crate::basis;
+use crate::error::{Error, Result};
+use crate::ghost::FaceStencil;
+use crate::parallel::{World, exchange};
+use crate::points::Points;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::numbering::Numbering;
+use crate::system::numbering::Touched;
+use crate::system::populated::Populated;
+
+use super::pieces;
+use crate::system::step_system::{self, Model};
+
+/// Share of the largest eigenvalue below which a motion counts as free. The rows are exact but
+/// for rounding; a held line of a thousandth of the body's length leaves 1e-6.
+const FREE: f64 = 1e-12;
+
+/// An error that names the body and the motion, and a point where it is of a piece alone. Every
+/// held component of a node is a row of the rigid motions' values there; the motions that all rows
+/// of a piece annihilate are free. Each piece is judged by the rank that owns its first node. The
+/// cells and nodes are those of [`crate::system::step_system::active`]. Collective.
+pub fn require<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    (populated, numbering): &(Populated, Numbering),
+    first: StepSpan,
+) -> Result<()> {
+    let (deck, grid, partition) = (&model.deck, &model.grid, &model.partition);
+    let faces = ties(world, model, populated)?;
+    let with_ties;
+    let numbering = if grid.element().is_simplex() {
+        let nodes = numbering.nodes.iter().chain(faces.iter().flat_map(|face| &face.nodes));
+        let nodes = Touched::settle(world, grid, partition, nodes.copied().collect())?;
+        with_ties = Numbering::build(world, nodes.owned, &nodes.foreign)?;
+        &with_ties
+    } else {
+        numbering
+    };
+    let conditions = Conditions::evaluate(
+        world,
+        grid,
+        deck.method.basis,
+        numbering,
+        points,
+        &deck.boundaries,
+        first,
+    )?;
+    let pieces = pieces::labels(world, grid, populated, &faces, numbering)?;
+    let (middle, length) = extent(world, points);
+    let motions = D + D * (D - 1) / 2;
+    let mut grams: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for (local, &piece) in pieces.iter().enumerate().take(numbering.owned) {
+        let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
+        let x = grid.node_position(numbering.nodes[local]);
+        let x: [f64; D] = std::array::from_fn(|a| (x[a] - middle[a]) / length);
+        for component in (0..D).filter(|c| conditions.fixed[local * D + c]) {
+            let row = motions_at(&x, component);
+            for (i, a) in row.iter().enumerate() {
+                for (j, b) in row.iter().enumerate() {
+                    gram[i * motions + j] += a * b;
+                }
+            }
+        }
+    }
+    let free = of_all_ranks(world, model, grams)?.into_iter().find_map(|(piece, gram)| {
+        let spectrum = DMatrix::from_vec(motions, motions, gram).symmetric_eigen();
+        let largest = spectrum.eigenvalues.max();
+        let free = (0..motions).find(|&k| spectrum.eigenvalues[k] <= FREE * largest.max(1e-300))?;
+        Some((piece, name(spectrum.eigenvectors.column(free).iter().copied(), D)))
+    });
+    let first = world.min_u64(free.as_ref().map_or(u64::MAX, |(piece, _)| *piece));
+    let motion = free.filter(|(piece, _)| *piece == first).map(|(_, motion)| motion);
+    let Some(motion) = world.first_message(motion) else { return Ok(()) };
+    let what = name_piece(world, model, points, numbering, &pieces, first)?;
+    Err(Error::Input(format!(
+        "{what} can {motion} freely: no boundary holds the nodes around it against this, so that \
+         the quasi-static system is singular; check the places and components of [[boundary]]"
+    )))
+}
+
+/// Ghost faces that hold cells together which share no node: only among simplices.
+fn ties<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    populated: &Populated,
+) -> Result<Vec<FaceStencil>> {
+    if !model.grid.element().is_simplex() {
+        return Ok(Vec::new());
+    }
+    step_system::find_faces(world, model, populated).map(|(faces, _)| faces)
+}
+
+/// The sums over all ranks of the pieces whose first node is owned here, ascending.
+fn of_all_ranks<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    grams: BTreeMap<u64, Vec<f64>>,
+) -> Result<BTreeMap<u64, Vec<f64>>> {
+    let mut outgoing: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
+    let motions = D + D * (D - 1) / 2;
+    for (piece, gram) in grams {
+        let owner = model.partition.owner_of_node(&model.grid, piece as usize);
+        let list = outgoing.entry(owner).or_default();
+        list.push(piece);
+        list.extend(gram.iter().map(|value| value.to_bits()));
+    }
+    let mut sums: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    for (_, words) in exchange(world, outgoing.into_iter().collect())? {
+        for record in words.chunks_exact(1 + motions * motions) {
+            let sum = sums.entry(record[0]).or_insert_with(|| vec![0.0; record.len() - 1]);
+            for (sum, &word) in sum.iter_mut().zip(&record[1..]) {
+                *sum += f64::from_bits(word);
+            }
+        }
+    }
+    Ok(sums)
+}
+
+/// The body of a piece, and its first point if it is not the whole body. Collective.
+fn name_piece<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    numbering: &Numbering,
+    pieces: &[u64],
+    piece: u64,
+) -> Result<String> {
+    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
+    let mut within = |p: usize| -> Result<bool> {
+        cells.clear();
+        nodes.clear();
+        let basis = model.deck.method.basis;
+        basis::populated_cells(&model.grid, basis, points, p, None, &mut cells)?;
+        cells.iter().take(1).for_each(|&cell| model.grid.cell_nodes(cell, &mut nodes));
+        Ok(nodes.iter().any(|&n| numbering.local(n).is_some_and(|local| pieces[local] == piece)))
+    };
+    let inside: Result<Vec<bool>> = (0..points.len()).map(&mut within).collect();
+    let inside = world.fail_together(inside)?;
+    let own = (0..points.len()).filter(|&p| inside[p]).min_by_key(|&p| points.id[p]);
+    let first = world.min_u64(own.map_or(u64::MAX, |p| points.id[p]));
+    let own = own.filter(|&p| points.id[p] == first);
+    let body = world.min_u64(own.map_or(u64::MAX, |p| u64::from(points.body[p]))) as usize;
+    let rest = (0..points.len()).any(|p| points.body[p] as usize == body && !inside[p]);
+    let whole = !world.any(rest);
+    let name = own.map(|p| {
+        let name = &model.deck.bodies[body].name;
+        if whole {
+            return format!("body \"{name}\"");
+        }
+        format!(
+            "a piece of body \"{name}\" that shares no grid node with the rest, the one with point \
+             {first} at {:?} m,",
+            points.position[p]
+        )
+    });
+    Ok(world.first_message(name).unwrap_or_default())
+}
+
+/// Middle and largest extent of all points.
+fn extent<const D: usize>(world: &World, points: &Points<D>) -> ([f64; D], f64) {
+    let end = |axis: usize, sign: f64| {
+        let own = points.position.iter().map(|x| sign * x[axis]).fold(f64::MIN, f64::max);
+        sign * world.max(own)
+    };
+    let high: [f64; D] = std::array::from_fn(|a| end(a, 1.0));
+    let low: [f64; D] = std::array::from_fn(|a| end(a, -1.0));
+    let length = (0..D).map(|a| high[a] - low[a]).fold(0.0, f64::max);
+    let middle = std::array::from_fn(|a| 0.5 * (high[a] + low[a]));
+    (middle, if length > 0.0 { length } else { 1.0 })
+}
+
+/// Component `c` of every rigid motion at `x`: translations, then turns in the planes of axes
+/// (0, 1), (1, 2), (2, 0).
+fn motions_at<const D: usize>(x: &[f64; D], component: usize) -> Vec<f64> {
+    let mut row = vec![0.0; D];
+    row[component] = 1.0;
+    for turn in 0..D * (D - 1) / 2 {
+        let (a, b) = (turn, (turn + 1) % D);
+        row.push(match component {
+            c if c == a => -x[b],
+            c if c == b => x[a],
+            _ => 0.0,
+        });
+    }
+    row
+}
+
+/// The motion in words.
+fn name(motion: impl Iterator<Item = f64>, dimension: usize) -> String {
+    let size: Vec<f64> = motion.map(f64::abs).collect();
+    let largest = (0..size.len()).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
+    const AXES: [&str; 3] = ["x", "y", "z"];
+    if largest < dimension {
+        format!("move along {}", AXES[largest])
+    } else if dimension == 2 {
+        "turn".into()
+    } else {
+        format!("turn about {}", AXES[(largest - dimension + 2) % 3])
+    }
+}

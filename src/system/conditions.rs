@@ -1,0 +1,200 @@
+//! Dirichlet conditions: which components of which active nodes move how far in this step.
+
+use crate::basis;
+use crate::deck::Scope;
+use crate::deck::expression::Expression;
+use crate::deck::model::{Basis, Boundary, Place, Rotation};
+use crate::deck::schema::AXES;
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::parallel::World;
+use crate::points::Points;
+
+use super::numbering::Numbering;
+
+/// Where in the analysis a step lies: load factor and time at both ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepSpan {
+    pub factor_start: f64,
+    pub factor_end: f64,
+    /// s
+    pub time_start: f64,
+    pub time_end: f64,
+}
+
+/// Prescribed increments at the local nodes (owned and ghost).
+#[derive(Debug, Clone, Default)]
+pub struct Conditions {
+    /// Per local degree of freedom (node * D + component): held by a condition.
+    pub fixed: Vec<bool>,
+    /// Increment over the step, m; zero where free.
+    pub increment: Vec<f64>,
+    /// Owned degrees of freedom of each boundary of the deck, ascending.
+    pub members: Vec<Vec<u32>>,
+}
+
+impl Conditions {
+    /// Evaluates the deck's boundaries for one step. Collective.
+    pub fn evaluate<const D: usize>(
+        world: &World,
+        grid: &Grid<D>,
+        basis: Basis,
+        numbering: &Numbering,
+        points: &Points<D>,
+        boundaries: &[Boundary],
+        span: StepSpan,
+    ) -> Result<Self> {
+        let mut conditions = Conditions {
+            fixed: vec![false; numbering.len() * D],
+            increment: vec![0.0; numbering.len() * D],
+            members: vec![Vec::new(); boundaries.len()],
+        };
+        let mut problem = None;
+        for (b, boundary) in boundaries.iter().enumerate() {
+            let inside = members(world, grid, basis, numbering, points, &boundary.place)?;
+            for local in (0..numbering.len()).filter(|&local| inside[local]) {
+                let node = numbering.nodes[local];
+                let mut held: [Option<f64>; D] = [None; D];
+                for &component in &boundary.fix {
+                    held[component] = Some(0.0);
+                }
+                for (component, expression) in &boundary.displacement {
+                    let start = grid.node_position_initial(node);
+                    held[*component] = Some(increment_of(expression, &start, span));
+                }
+                if let Some(rotation) = &boundary.rotation {
+                    let turn = rotated(rotation, &grid.node_position(node), span);
+                    for (slot, value) in held.iter_mut().zip(turn) {
+                        *slot = Some(value);
+                    }
+                }
+                for (component, value) in held.iter().enumerate() {
+                    let Some(value) = *value else { continue };
+                    let dof = local * D + component;
+                    if !value.is_finite() {
+                        problem = problem.or(Some(format!(
+                            "boundary \"{}\" moves {} of the node at {:?} by \
+                             {value}: its expression is not finite there",
+                            boundary.name,
+                            AXES[component],
+                            grid.node_position(node),
+                        )));
+                    }
+                    let clash = conditions.fixed[dof] && conditions.increment[dof] != value;
+                    if clash && conditions.increment[dof] != 0.0 && value != 0.0 {
+                        problem = problem.or(Some(format!(
+                            "boundary \"{}\" moves {} of the node at {:?} by \
+                             {value} in this step, but an earlier boundary moves it by {}; let \
+                             one of them leave the node out",
+                            boundary.name,
+                            AXES[component],
+                            grid.node_position(node),
+                            conditions.increment[dof]
+                        )));
+                    }
+                    if !clash || value != 0.0 {
+                        conditions.increment[dof] = value;
+                    }
+                    conditions.fixed[dof] = true;
+                    if local < numbering.owned {
+                        conditions.members[b].push(dof as u32);
+                    }
+                }
+            }
+        }
+        match world.first_message(problem) {
+            Some(problem) => Err(Error::Input(problem)),
+            None => Ok(conditions),
+        }
+    }
+}
+
+/// Which local nodes lie in `place`.
+fn members<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    basis: Basis,
+    numbering: &Numbering,
+    points: &Points<D>,
+    place: &Place,
+) -> Result<Vec<bool>> {
+    match place {
+        Place::CellsOf { body } => cells_of(world, grid, basis, numbering, points, *body),
+        Place::Side { axis, upper } => {
+            Ok(numbering.nodes.iter().map(|&node| grid.on_side(node, *axis, *upper)).collect())
+        }
+        Place::Tag(tag) => {
+            let tagged = grid.tagged_nodes(tag)?;
+            Ok(numbering.nodes.iter().map(|node| tagged.binary_search(node).is_ok()).collect())
+        }
+        Place::Box { min, max } => {
+            let slack = 1e-9 * grid.cell_size();
+            Ok(numbering
+                .nodes
+                .iter()
+                .map(|&node| {
+                    let x = grid.node_position_initial(node);
+                    (0..D).all(|a| x[a] >= min[a] - slack && x[a] <= max[a] + slack)
+                })
+                .collect())
+        }
+    }
+}
+
+/// Nodes of the cells reached by the outermost points of a body, wherever those points live.
+fn cells_of<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    basis: Basis,
+    numbering: &Numbering,
+    points: &Points<D>,
+    body: usize,
+) -> Result<Vec<bool>> {
+    let mut marks = vec![0.0; numbering.len()];
+    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
+    for p in 0..points.len() {
+        if points.body[p] as usize != body || points.outermost[p] == 0.0 {
+            continue;
+        }
+        cells.clear();
+        basis::populated_cells(grid, basis, points, p, None, &mut cells)?;
+        for &cell in &cells {
+            nodes.clear();
+            grid.cell_nodes(cell, &mut nodes);
+            for &node in &nodes {
+                if let Some(local) = numbering.local(node) {
+                    marks[local] = 1.0;
+                }
+            }
+        }
+    }
+    numbering.halo.reverse_add(world, &mut marks, 1)?;
+    numbering.halo.forward(world, &mut marks, 1)?;
+    Ok(marks.into_iter().map(|mark| mark > 0.0).collect())
+}
+
+/// Increment of a prescribed total displacement over the step. Without `s` or `t` the total is
+/// reached linearly with the load factor.
+fn increment_of<const D: usize>(expression: &Expression, start: &[f64; D], span: StepSpan) -> f64 {
+    let mut initial = [0.0; 3];
+    initial[..D].copy_from_slice(start);
+    let at = |load_factor: f64, time: f64| {
+        expression.value(&Scope { initial, current: initial, load_factor, time })
+    };
+    if expression.depends_on_time() {
+        at(span.factor_end, span.time_end) - at(span.factor_start, span.time_start)
+    } else {
+        at(span.factor_end, span.time_end) * (span.factor_end - span.factor_start)
+    }
+}
+
+/// Displacement of `x` under the step's share of a rigid rotation about z.
+fn rotated<const D: usize>(rotation: &Rotation, x: &[f64; D], span: StepSpan) -> [f64; D] {
+    let angle = rotation.degrees.to_radians() * (span.factor_end - span.factor_start);
+    let (sin, cos) = angle.sin_cos();
+    let arm = [x[0] - rotation.centre[0], x[1] - rotation.centre[1]];
+    let mut moved = [0.0; D];
+    moved[0] = (cos - 1.0) * arm[0] - sin * arm[1];
+    moved[1] = sin * arm[0] + (cos - 1.0) * arm[1];
+    moved
+}

@@ -1,0 +1,36 @@
+//! A step's equations: active nodes, their numbers, the sparsity, and the terms that fill it
+//! (Ghost Figure 1 b, c).
+//!
+//! | file | idea |
+//! |---|---|
+//! | `step_system.rs` | locate, map and number: the grid side of a step |
+//! | `populated.rs` | which cells hold material, and whose |
+//! | `numbering.rs` | equations over active nodes, contiguous by rank |
+//! | `node_index.rs` | grid nodes to small indices |
+//! | `graph.rs` | which nodes meet |
+//! | `pattern.rs` | exact sparsity, and where every contribution goes |
+//! | `places.rs` | where each dense block lies in the rows |
+//! | `kernel.rs` | sums over points, tiled for vector registers |
+//! | `plain.rs` | these sums once more, written as the formulas read |
+//! | `border.rs` | what waits for other ranks, and what does not |
+//! | `scatter.rs` | dense blocks into the rows of their owners |
+//! | `in_place.rs` | those rows in the solver's own memory |
+//! | `held.rs` | held degrees of freedom in those rows |
+//! | `conditions.rs` | Dirichlet conditions on the nodes |
+//! | `terms/` | contributions to the equations |
+
+pub mod border;
+pub mod conditions;
+pub mod graph;
+pub mod held;
+pub mod in_place;
+pub mod kernel;
+pub mod node_index;
+pub mod numbering;
+pub mod pattern;
+pub mod places;
+pub mod plain;
+pub mod populated;
+pub mod scatter;
+pub mod step_system;
+pub mod terms;

@@ -1,0 +1,316 @@
+//! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
+
+use super::border::Border;
+use super::conditions::{Conditions, StepSpan};
+use super::numbering::Numbering;
+use super::numbering::Touched;
+use super::pattern::{self, Pattern};
+use super::populated::Populated;
+use super::terms::stress::StepPoints;
+use crate::basis::{self, Groups, Influences};
+use crate::deck::Deck;
+use crate::deck::model::{Basis, PointVolume};
+use crate::error::Result;
+use crate::ghost::stencil::Penalty;
+use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
+use crate::grid::Grid;
+use crate::loads::manufactured::Manufactured;
+use crate::loads::point_forces;
+use crate::material::Material;
+use crate::output::tables::history::HistoryRow;
+use crate::parallel::{Partition, World};
+use crate::points::Points;
+
+use crate::parallel::balance::{Balance, imbalance};
+
+/// What stays the same while points move: the deck made computable.
+pub struct Model<const D: usize> {
+    pub deck: Deck,
+    pub grid: Grid<D>,
+    pub partition: Partition<D>,
+    /// One per body.
+    pub materials: Vec<Material>,
+    /// One per body.
+    pub penalties: Vec<Penalty>,
+    /// The field of a `manufactured` load with its derivatives.
+    pub manufactured: Option<Manufactured>,
+    pub balance: Balance,
+}
+
+impl<const D: usize> Model<D> {
+    /// Whether every body has Ghost stiffness.
+    pub fn stabilised(&self) -> bool {
+        self.penalties.iter().all(|penalty| penalty.stiffness > 0.0)
+    }
+
+    /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.
+    pub fn point_forces(
+        &self,
+        world: &World,
+        points: &Points<D>,
+        load_factor: f64,
+        time: f64,
+    ) -> Result<Vec<[f64; D]>> {
+        world.fail_together(point_forces::point_forces(
+            points,
+            &self.materials,
+            &self.deck.loads,
+            self.manufactured.as_ref(),
+            self.deck.analysis.kind,
+            load_factor,
+            time,
+        ))
+    }
+}
+
+/// Everything a step needs that depends on where the points are at its start.
+pub struct Discretisation<const D: usize> {
+    pub influences: Influences<D>,
+    pub groups: Groups,
+    /// Local node of each entry of `groups.nodes`.
+    pub group_nodes: Vec<u32>,
+    /// Points that touch ghosts, and the others.
+    pub border: Border,
+    /// The same of groups.
+    pub group_border: Border,
+    pub populated: Populated,
+    /// Faces owned here.
+    pub faces: Vec<FaceStencil>,
+    pub numbering: Numbering,
+    pub pattern: Pattern,
+    /// How firmly each local node holds material: the weight, and for `mpm` the size of the
+    /// gradients too, which is finite where a point on a cell's edge has no weight.
+    pub node_grip: Vec<f64>,
+    /// Local nodes that a Ghost face stabilises.
+    pub on_face: Vec<bool>,
+    /// Cells of the faces owned here.
+    pub ghost_cells: Vec<usize>,
+    /// What stresses are integrated over.
+    pub point_volume: PointVolume,
+}
+
+/// Whether the step's equations couple nodes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coupling {
+    /// Faces and sparsity are found.
+    Matrix,
+    /// The same for a mass: what [`Discretisation::nodes_left_out`] reads is not.
+    Mass,
+    /// A diagonal system: neither faces nor sparsity (both stay empty).
+    Diagonal,
+}
+
+impl<const D: usize> Discretisation<D> {
+    /// Maps the points onto the grid and numbers the equations. Collective.
+    pub fn new(world: &World, model: &Model<D>, points: &Points<D>) -> Result<Self> {
+        Self::with_coupling(world, model, points, Coupling::Matrix)
+    }
+
+    /// The grid side of a step together with what the boundaries prescribe in it. Collective.
+    pub fn with_conditions(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        coupling: Coupling,
+        span: StepSpan,
+    ) -> Result<(Self, Conditions)> {
+        let mesh = Self::with_coupling(world, model, points, coupling)?;
+        let conditions = Conditions::evaluate(
+            world,
+            &model.grid,
+            model.deck.method.basis,
+            &mesh.numbering,
+            points,
+            &model.deck.boundaries,
+            span,
+        )?;
+        Ok((mesh, conditions))
+    }
+
+    /// What a history row says of the grid side, the rest of the row at its defaults. Collective.
+    pub fn row(&self, world: &World, points: &Points<D>) -> HistoryRow {
+        HistoryRow {
+            ghost_faces: world.sum_usize(self.faces.len()),
+            populated_cells: world.sum_usize(self.populated.owned.len()),
+            imbalance: imbalance(world, points.len()),
+            ..HistoryRow::default()
+        }
+    }
+
+    /// As [`Self::new`]. Collective.
+    pub fn with_coupling(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        coupling: Coupling,
+    ) -> Result<Self> {
+        let (grid, partition) = (&model.grid, &model.partition);
+        let basis = model.deck.method.basis;
+        let influences = world.fail_together(basis::map_points(grid, basis, points))?;
+        let groups = Groups::new(&influences);
+        let populated = Populated::find(world, grid, partition, basis, points, Some(&influences))?;
+        let (faces, ghost_cells) = match coupling {
+            Coupling::Matrix | Coupling::Mass => find_faces(world, model, &populated)?,
+            Coupling::Diagonal => Default::default(),
+        };
+
+        // A point's nodes are those of the cells it populates.
+        let mut reached: Vec<usize> =
+            faces.iter().flat_map(|face| face.nodes.iter().copied()).collect();
+        append_nodes(world, grid, &populated, &mut reached);
+        let touched = Touched::settle(world, grid, partition, reached)?;
+        let supports = (0..groups.len())
+            .map(|g| groups.nodes(g))
+            .chain(faces.iter().map(|face| face.nodes.as_slice()));
+        let owner_of = |node| partition.owner_of_node(grid, node);
+        let (numbering, pattern) = match coupling {
+            Coupling::Matrix | Coupling::Mass => {
+                pattern::build(world, touched, owner_of, supports)?
+            }
+            Coupling::Diagonal => {
+                (Numbering::build(world, touched.owned, &touched.foreign)?, Pattern::default())
+            }
+        };
+
+        let locals = |nodes: &[usize]| -> Vec<u32> {
+            nodes.iter().filter_map(|&node| numbering.local(node).map(|i| i as u32)).collect()
+        };
+        let group_nodes = locals(&groups.nodes);
+        let group_reaches: Vec<bool> = groups
+            .node_offsets
+            .windows(2)
+            .map(|range| {
+                group_nodes[range[0]..range[1]].iter().any(|&n| n as usize >= numbering.owned)
+            })
+            .collect();
+        let border = Border::new(groups.group_of_point.iter().map(|&group| group_reaches[group]));
+        let group_border = Border::new(group_reaches.into_iter());
+        let mut node_grip = vec![0.0; numbering.len()];
+        if coupling == Coupling::Matrix {
+            let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
+            for (p, &group) in groups.group_of_point.iter().enumerate() {
+                let nodes =
+                    &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
+                for (&node, entry) in nodes.iter().zip(influences.row(p)) {
+                    let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>();
+                    node_grip[node as usize] +=
+                        influences.weights[entry].abs() + reach * slope.sqrt();
+                }
+            }
+        }
+        let mut on_face = vec![0.0; numbering.len()];
+        if coupling == Coupling::Matrix {
+            for face in &faces {
+                for node in locals(&face.nodes) {
+                    on_face[node as usize] = 1.0;
+                }
+            }
+            for field in [&mut node_grip, &mut on_face] {
+                numbering.halo.reverse_add(world, field, 1)?;
+                numbering.halo.forward(world, field, 1)?;
+            }
+        }
+        Ok(Discretisation {
+            influences,
+            groups,
+            group_nodes,
+            border,
+            group_border,
+            populated,
+            faces,
+            numbering,
+            pattern,
+            node_grip,
+            on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
+            ghost_cells,
+            point_volume: model.deck.method.point_volume,
+        })
+    }
+
+    /// The points as the equations see them.
+    pub fn step_points<'a>(
+        &'a self,
+        points: &'a Points<D>,
+        materials: &'a [Material],
+    ) -> StepPoints<'a, D> {
+        StepPoints {
+            points,
+            materials,
+            influences: &self.influences,
+            groups: &self.groups,
+            group_nodes: &self.group_nodes,
+            border: &self.group_border,
+            volume: self.point_volume,
+        }
+    }
+
+    /// Sum of basis weights at each local node, over all ranks. Collective.
+    pub fn node_weights(&self, world: &World) -> Result<Vec<f64>> {
+        let mut sums = vec![0.0; self.numbering.len()];
+        let (groups, influences) = (&self.groups, &self.influences);
+        for (p, &group) in groups.group_of_point.iter().enumerate() {
+            let nodes = groups.node_offsets[group]..groups.node_offsets[group + 1];
+            let weights = &influences.weights[influences.row(p)];
+            for (&node, weight) in self.group_nodes[nodes].iter().zip(weights) {
+                sums[node as usize] += weight;
+            }
+        }
+        self.numbering.halo.reverse_add(world, &mut sums, 1)?;
+        self.numbering.halo.forward(world, &mut sums, 1)?;
+        Ok(sums)
+    }
+
+    /// Local nodes that carry no equation of their own: their grip on the material is at most
+    /// `threshold` times the largest one, and no Ghost face holds them. Collective.
+    pub fn nodes_left_out(&self, world: &World, threshold: f64) -> Vec<bool> {
+        let largest = world.max(self.node_grip.iter().copied().fold(0.0, f64::max));
+        self.node_grip
+            .iter()
+            .zip(&self.on_face)
+            .map(|(&grip, &on_face)| !on_face && grip <= threshold * largest)
+            .collect()
+    }
+}
+
+/// The populated cells and the nodes at them, numbered: all that is known of a step's system before
+/// it is built. Collective.
+pub fn active<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> Result<(Populated, Numbering)> {
+    let (grid, partition) = (&model.grid, &model.partition);
+    let populated = Populated::find(world, grid, partition, model.deck.method.basis, points, None)?;
+    let mut reached = Vec::new();
+    append_nodes(world, grid, &populated, &mut reached);
+    let touched = Touched::settle(world, grid, partition, reached)?;
+    Ok((populated, Numbering::build(world, touched.owned, &touched.foreign)?))
+}
+
+/// Appends the nodes of the populated cells owned or reached here.
+fn append_nodes<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    populated: &Populated,
+    nodes: &mut Vec<usize>,
+) {
+    let of_others = populated.reached.iter().filter(|&&cell| {
+        world.size() > 1 && populated.owned.binary_search_by_key(&cell, |own| own.0).is_err()
+    });
+    for &cell in populated.owned.iter().map(|(cell, _)| cell).chain(of_others) {
+        grid.cell_nodes(cell, nodes);
+    }
+}
+
+/// The Ghost faces owned here and the cells beside them.
+pub(crate) fn find_faces<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    populated: &Populated,
+) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
+    let Some(ghost) = &model.deck.ghost else { return Ok((Vec::new(), Vec::new())) };
+    let faces = boundary_faces(world, &model.grid, &model.partition, &populated.owned)?;
+    let cells = faces.iter().flat_map(|face| [face.pair.lower, face.pair.upper]).collect();
+    let stencils = face_stencils(&model.grid, &faces, ghost.scaling, &model.penalties);
+    Ok((world.fail_together(stencils)?, cells))
+}

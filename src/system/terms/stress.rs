@@ -1,0 +1,314 @@
+//! f_int = Σ_p ∇S^T T V and K = Σ_p ∇S^T A ∇S V (Lagrangian eq. 20-23, 27, 28), one dense block
+//! per group of points that share their nodes.
+
+use std::ops::Range;
+
+use crate::basis::{Groups, Influences};
+use crate::deck::model::{Frame, PointVolume};
+use crate::material::Material;
+use crate::mechanics::{self, Contribution, StepStart};
+use crate::points::Points;
+use crate::tensor::fused::{self, multiply_add};
+
+use crate::system::border::Border;
+use crate::system::kernel::Batch;
+use crate::system::numbering::Numbering;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockRows;
+
+/// What a step's points look like to the equations: fixed while the step is solved.
+#[derive(Clone, Copy)]
+pub struct StepPoints<'a, const D: usize> {
+    pub points: &'a Points<D>,
+    /// One material per body.
+    pub materials: &'a [Material],
+    pub influences: &'a Influences<D>,
+    pub groups: &'a Groups,
+    /// Local node index of each entry of `groups.nodes`.
+    pub group_nodes: &'a [u32],
+    /// Groups that touch nodes of other ranks, and the others.
+    pub border: &'a Border,
+    pub volume: PointVolume,
+}
+
+impl<'a, const D: usize> StepPoints<'a, D> {
+    /// Local nodes of a group of points.
+    #[inline]
+    pub fn nodes_of_group(&self, group: usize) -> &'a [u32] {
+        let offsets = &self.groups.node_offsets;
+        &self.group_nodes[offsets[group]..offsets[group + 1]]
+    }
+
+    /// Local nodes of point `p`, in the order of its influences.
+    #[inline]
+    pub fn nodes_of(&self, p: usize) -> &'a [u32] {
+        self.nodes_of_group(self.groups.group_of_point[p])
+    }
+}
+
+/// Health of an evaluation on this rank.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Health {
+    /// Point index with det dF <= 0, if any.
+    pub inverted: Option<usize>,
+    /// Point index with a stress that is not finite, if any.
+    pub not_finite: Option<usize>,
+}
+
+impl Health {
+    pub fn is_sound(&self) -> bool {
+        self.not_finite.is_none()
+    }
+
+    /// Of both, the first to be named of either kind.
+    pub fn and(self, other: Health) -> Health {
+        Health {
+            inverted: self.inverted.or(other.inverted),
+            not_finite: self.not_finite.or(other.not_finite),
+        }
+    }
+}
+
+/// Internal force at the local nodes (ghost shares included, not yet sent) and, if `stiffness`
+/// is given, the tangent added into it, for the nodal increments `displacement` (local).
+///
+/// `step.groups` are the first supports of `pattern`, in its order. Sums are rounded as the
+/// processor's instruction set allows, in the same order on every call.
+pub fn assemble<const D: usize, R: BlockRows<D>>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    numbering: &Numbering,
+    pattern: &Pattern,
+    displacement: &[f64],
+    force: &mut [f64],
+    mut stiffness: Option<&mut R>,
+) -> Health {
+    debug_assert!(numbering.len() * D <= force.len());
+    let mut health = Health::default();
+    for part in [&step.border.reaching, &step.border.inner] {
+        let rows = stiffness.as_deref_mut();
+        health = health.and(assemble_groups(step, part, frame, pattern, displacement, force, rows));
+    }
+    health
+}
+
+/// [`assemble`] of some groups.
+pub fn assemble_groups<const D: usize, R: BlockRows<D>>(
+    step: StepPoints<'_, D>,
+    which: &[Range<usize>],
+    frame: Frame,
+    pattern: &Pattern,
+    displacement: &[f64],
+    force: &mut [f64],
+    stiffness: Option<&mut R>,
+) -> Health {
+    let task = Task { step, which, frame, pattern, displacement };
+    #[cfg(target_arch = "x86_64")]
+    if fused::has_avx2() {
+        // SAFETY: the processor has just said that it knows the instructions.
+        return unsafe { assemble_avx2(&task, force, stiffness) };
+    }
+    task.assemble::<false, R>(force, stiffness)
+}
+
+/// [`Task::assemble`] compiled for AVX2 with fused multiply-add.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma")]
+fn assemble_avx2<const D: usize, R: BlockRows<D>>(
+    task: &Task<'_, D>,
+    force: &mut [f64],
+    stiffness: Option<&mut R>,
+) -> Health {
+    task.assemble::<true, R>(force, stiffness)
+}
+
+/// What an evaluation reads.
+struct Task<'a, const D: usize> {
+    step: StepPoints<'a, D>,
+    /// Groups.
+    which: &'a [Range<usize>],
+    frame: Frame,
+    pattern: &'a Pattern,
+    displacement: &'a [f64],
+}
+
+/// One group's arrays, reused from group to group.
+struct Workspace<const D: usize> {
+    displacement: Vec<[f64; D]>,
+    force: Vec<[f64; D]>,
+    gradients: Vec<[f64; D]>,
+    /// Address and width of each node's scalar rows.
+    rows: Vec<(usize, usize)>,
+    batch: Batch,
+}
+
+impl<const D: usize> Task<'_, D> {
+    /// Inlined into each form so that it is compiled for that form's instructions.
+    #[inline(always)]
+    fn assemble<const FUSED: bool, R: BlockRows<D>>(
+        &self,
+        force: &mut [f64],
+        mut stiffness: Option<&mut R>,
+    ) -> Health {
+        let mut health = Health::default();
+        let mut work = Workspace {
+            displacement: Vec::new(),
+            force: Vec::new(),
+            gradients: Vec::new(),
+            rows: Vec::new(),
+            batch: Batch::default(),
+        };
+        let groups = self.step.groups;
+        for group in self.which.iter().cloned().flatten() {
+            let range = groups.node_offsets[group]..groups.node_offsets[group + 1];
+            let nodes = &self.step.group_nodes[range];
+            work.displacement.clear();
+            work.displacement.extend(nodes.iter().map(|&node| {
+                let start = node as usize * D;
+                std::array::from_fn(|i| self.displacement[start + i])
+            }));
+            work.force.clear();
+            work.force.resize(nodes.len(), [0.0; D]);
+            work.batch.start::<D>(nodes.len());
+            if let Some(matrix) = stiffness.as_deref_mut() {
+                self.find_rows(nodes, matrix, &mut work.rows);
+            }
+            for &p in groups.points(group) {
+                self.add_point::<FUSED>(p, &mut work, &mut health, stiffness.is_some());
+                if work.batch.is_full() {
+                    self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
+                }
+            }
+            self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
+            for (&node, sum) in nodes.iter().zip(&work.force) {
+                for i in 0..D {
+                    force[node as usize * D + i] += sum[i];
+                }
+            }
+        }
+        health
+    }
+
+    #[inline(always)]
+    fn find_rows<R: BlockRows<D>>(
+        &self,
+        nodes: &[u32],
+        matrix: &mut R,
+        rows: &mut Vec<(usize, usize)>,
+    ) {
+        let pattern = self.pattern;
+        rows.clear();
+        for &node in nodes {
+            let row = pattern.row_of[node as usize] as usize;
+            matrix.touch(pattern, row);
+            let width = pattern.offsets[row + 1] - pattern.offsets[row];
+            rows.push((matrix.start(pattern, row), D * width));
+        }
+    }
+
+    #[inline(always)]
+    fn flush<const FUSED: bool, R: BlockRows<D>>(
+        &self,
+        group: usize,
+        work: &mut Workspace<D>,
+        stiffness: Option<&mut R>,
+    ) {
+        let Some(matrix) = stiffness else { return };
+        if !work.batch.is_empty() {
+            work.batch.flush::<D, FUSED, R>(self.pattern.places.of(group), &work.rows, matrix);
+        }
+    }
+
+    #[inline(always)]
+    fn add_point<const FUSED: bool>(
+        &self,
+        p: usize,
+        work: &mut Workspace<D>,
+        health: &mut Health,
+        with_block: bool,
+    ) {
+        let step = self.step;
+        let gradients = &step.influences.gradients[step.influences.row(p)];
+        let increment = deformation_increment(gradients, |a| work.displacement[a]);
+        let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
+        let map = &contribution.gradient_map;
+        let stress = contribution.stress.map(|row| row.map(|s| s * contribution.volume));
+        work.gradients.clear();
+        for (gradient, force) in gradients.iter().zip(&mut work.force) {
+            let mut mapped = [0.0; D];
+            for j in 0..D {
+                for i in 0..D {
+                    mapped[j] = multiply_add::<FUSED>(gradient[i], map[i][j], mapped[j]);
+                }
+            }
+            for i in 0..D {
+                for j in 0..D {
+                    force[i] = multiply_add::<FUSED>(stress[i][j], mapped[j], force[i]);
+                }
+            }
+            work.gradients.push(mapped);
+        }
+        if with_block {
+            work.batch.push::<D, FUSED>(&work.gradients, &contribution);
+        }
+    }
+}
+
+/// Stress and tangent of a point; `None`, and a note in `health`, if the stress is not finite.
+#[inline(always)]
+pub(crate) fn respond<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    increment: &[[f64; D]; D],
+    health: &mut Health,
+) -> Option<Contribution<D>> {
+    let points = step.points;
+    let start = StepStart {
+        material: &step.materials[points.body[p] as usize],
+        deformation_gradient: &points.deformation_gradient[p],
+        elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
+        volume_initial: match step.volume {
+            PointVolume::Deformation => points.volume_initial[p],
+            PointVolume::Domain => domain_volume(points, p),
+        },
+    };
+    let (contribution, state) = mechanics::contribution(frame, &start, increment);
+    if crate::tensor::dense::determinant(increment) <= 0.0 {
+        health.inverted.get_or_insert(p);
+    }
+    if !state.kirchhoff_stress.iter().all(|t| t.is_finite()) {
+        health.not_finite.get_or_insert(p);
+        return None;
+    }
+    Some(contribution)
+}
+
+/// The initial volume of which det F makes that of the domain at the step's start, m3.
+#[cold]
+fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
+    let (now, start) = (&points.half_length[p], &points.half_length_initial[p]);
+    let ratio: f64 = now.iter().zip(start).map(|(now, start)| now / start).product();
+    points.volume_initial[p] * ratio / points.deformation_gradient[p].determinant()
+}
+
+/// dF = 1 + Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7).
+#[inline]
+pub fn deformation_increment<const D: usize>(
+    gradients: &[[f64; D]],
+    displacement: impl Fn(usize) -> [f64; D],
+) -> [[f64; D]; D] {
+    let mut increment = [[0.0; D]; D];
+    for (i, row) in increment.iter_mut().enumerate() {
+        row[i] = 1.0;
+    }
+    for (a, gradient) in gradients.iter().enumerate() {
+        let u = displacement(a);
+        for i in 0..D {
+            for j in 0..D {
+                increment[i][j] += u[i] * gradient[j];
+            }
+        }
+    }
+    increment
+}

@@ -1,0 +1,273 @@
+//! Sums over points at the nodes, and nodal values at the points (Ghost eq. 6, 8-10).
+//!
+//! Nodal arrays hold one value (or vector) per local node; what this rank adds to nodes of
+//! others is not yet sent. Sums run in the order of the points.
+
+use std::ops::Range;
+
+use crate::system::terms::stress::StepPoints;
+use crate::tensor::Square;
+use crate::tensor::dense;
+
+/// Σ_p m S^T v (Ghost eq. 10), kg m/s.
+pub fn momentum<const D: usize>(
+    step: StepPoints<'_, D>,
+    velocity: &[[f64; D]],
+    nodes: usize,
+) -> Vec<[f64; D]> {
+    let mut sums = vec![[0.0; D]; nodes];
+    add_momentum(step, 0..step.points.len(), velocity, &mut sums);
+    sums
+}
+
+/// Adds [`momentum`] of some of the points.
+pub fn add_momentum<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    velocity: &[[f64; D]],
+    sums: &mut [[f64; D]],
+) {
+    for p in part {
+        let carried = velocity[p].map(|v| v * step.points.mass[p]);
+        let weights = &step.influences.weights[step.influences.row(p)];
+        for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
+            let sum = &mut sums[node as usize];
+            for i in 0..D {
+                sum[i] += weight * carried[i];
+            }
+        }
+    }
+}
+
+/// Σ_p S^T f - ∇S^T σ V (Ghost eq. 6), N, with σ V = τ V0. `external` is the force on each
+/// point, empty for none. `increments` holds dF since the gradients were computed, empty for
+/// none: the gradients are then those of the deformed state, ∇S dF^-1.
+pub fn force<const D: usize>(
+    step: StepPoints<'_, D>,
+    external: &[[f64; D]],
+    increments: &[Square<D>],
+    nodes: usize,
+) -> Vec<[f64; D]> {
+    let mut sums = vec![[0.0; D]; nodes];
+    add_force(step, 0..step.points.len(), external, increments, &mut sums);
+    sums
+}
+
+/// Adds [`force`] of some of the points.
+pub fn add_force<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    external: &[[f64; D]],
+    increments: &[Square<D>],
+    sums: &mut [[f64; D]],
+) {
+    let points = step.points;
+    for p in part {
+        let volume = points.volume_initial[p];
+        let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
+        // Row i of τ V0 dF^-T: what the gradient is multiplied with.
+        let mut flux = stress.map(|row| row.map(|s| s * volume));
+        if let Some(increment) = increments.get(p) {
+            let (inverse, _) = dense::inverse(increment);
+            flux = dense::multiply_transposed(&flux, &inverse);
+        }
+        let own = external.get(p).copied().unwrap_or([0.0; D]);
+        let row = step.influences.row(p);
+        let (weights, gradients) =
+            (&step.influences.weights[row.clone()], &step.influences.gradients[row]);
+        for ((&node, weight), gradient) in step.nodes_of(p).iter().zip(weights).zip(gradients) {
+            let sum = &mut sums[node as usize];
+            for i in 0..D {
+                sum[i] += weight * own[i] - dense::dot(&flux[i], gradient);
+            }
+        }
+    }
+}
+
+/// [`add_momentum`] and [`add_force`] in one pass, to the last bit the same.
+pub fn add_momentum_and_force<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    external: &[[f64; D]],
+    momenta: &mut [[f64; D]],
+    forces: &mut [[f64; D]],
+) {
+    let points = step.points;
+    for p in part {
+        let volume = points.volume_initial[p];
+        let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
+        let flux = stress.map(|row| row.map(|s| s * volume));
+        let carried = points.velocity[p].map(|v| v * points.mass[p]);
+        let own = external.get(p).copied().unwrap_or([0.0; D]);
+        let row = step.influences.row(p);
+        let (weights, gradients) =
+            (&step.influences.weights[row.clone()], &step.influences.gradients[row]);
+        for ((&node, weight), gradient) in step.nodes_of(p).iter().zip(weights).zip(gradients) {
+            let (momentum, force) = (&mut momenta[node as usize], &mut forces[node as usize]);
+            for i in 0..D {
+                momentum[i] += weight * carried[i];
+                force[i] += weight * own[i] - dense::dot(&flux[i], gradient);
+            }
+        }
+    }
+}
+
+/// Rates S a and velocities of the points.
+pub struct Pushed<const D: usize> {
+    pub rate: Vec<[f64; D]>,
+    pub velocity: Vec<[f64; D]>,
+}
+
+impl<const D: usize> Pushed<D> {
+    pub fn zeros(points: usize) -> Self {
+        Pushed { rate: vec![[0.0; D]; points], velocity: vec![[0.0; D]; points] }
+    }
+
+    /// Rates S a and new velocities α (v_p + dt S a) + (1 - α) S v' of some of the points (Ghost
+    /// eq. 8), α = `share`; `acceleration` and `velocity` v' hold `D` values per local node.
+    pub fn push(
+        &mut self,
+        step: StepPoints<'_, D>,
+        part: Range<usize>,
+        [velocity, acceleration]: [&[f64]; 2],
+        share: f64,
+        dt: f64,
+    ) {
+        let of_nodes = share < 1.0;
+        for p in part {
+            let (mut rate, mut carried) = ([0.0; D], [0.0; D]);
+            let weights = &step.influences.weights[step.influences.row(p)];
+            for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
+                let range = node as usize * D..node as usize * D + D;
+                let a = &acceleration[range.clone()];
+                for i in 0..D {
+                    rate[i] += weight * a[i];
+                }
+                if of_nodes {
+                    let v = &velocity[range];
+                    for i in 0..D {
+                        carried[i] += weight * v[i];
+                    }
+                }
+            }
+            let before = &step.points.velocity[p];
+            self.rate[p] = rate;
+            self.velocity[p] = std::array::from_fn(|i| {
+                let pushed = before[i] + dt * rate[i];
+                if of_nodes { share * pushed + (1.0 - share) * carried[i] } else { pushed }
+            });
+        }
+    }
+}
+
+/// Σ_v S u at each point; `nodal` holds `D` values per local node.
+pub fn at_points<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<[f64; D]> {
+    (0..step.points.len())
+        .map(|p| {
+            let mut sum = [0.0; D];
+            let weights = &step.influences.weights[step.influences.row(p)];
+            for (&node, weight) in step.nodes_of(p).iter().zip(weights) {
+                let value = &nodal[node as usize * D..node as usize * D + D];
+                for i in 0..D {
+                    sum[i] += weight * value[i];
+                }
+            }
+            sum
+        })
+        .collect()
+}
+
+/// dF = 1 + Σ_v u ∇S at each point (Lagrangian eq. 7).
+pub fn deformation_increments<const D: usize>(
+    step: StepPoints<'_, D>,
+    displacement: &[f64],
+) -> Vec<Square<D>> {
+    (0..step.points.len())
+        .map(|p| {
+            let mut increment = dense::identity();
+            let gradients = &step.influences.gradients[step.influences.row(p)];
+            for (&node, gradient) in step.nodes_of(p).iter().zip(gradients) {
+                let u = &displacement[node as usize * D..node as usize * D + D];
+                for i in 0..D {
+                    for j in 0..D {
+                        increment[i][j] += u[i] * gradient[j];
+                    }
+                }
+            }
+            increment
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::system::border::Border;
+    use nalgebra::Matrix3;
+
+    use super::*;
+    use crate::basis::{self, Groups};
+    use crate::deck::model::{Basis, PointVolume};
+    use crate::grid::{Grid, Lattice};
+    use crate::points::Points;
+
+    /// One pass gives what the formulas give one after the other.
+    #[test]
+    fn fused_passes_agree_with_the_plain_ones() {
+        let lattice = Lattice { origin: [0.0; 2], spacing: [0.5, 0.4], cells: [5, 6] };
+        let (grid, nodes) = (Grid::Lattice(lattice), 6 * 7);
+        let mut points = Points::<2>::default();
+        for k in 0..40 {
+            let t = k as f64;
+            let x = [1.2 + 0.6 * (1.3 * t).sin(), 1.1 + 0.7 * (0.7 * t).cos()];
+            points.push_unstrained(k, 0, x, 0.01 + 0.001 * t, 3.0, [0.06, 0.05]);
+            points.velocity[k as usize] = [t.cos(), 0.3 * t];
+            points.kirchhoff_stress[k as usize] =
+                Matrix3::new(t, 2.0, 0.0, 2.0, t.sin(), 0.0, 0.0, 0.0, 1.0);
+        }
+        let external: Vec<[f64; 2]> = (0..40).map(|k| [0.1 * k as f64, -1.0]).collect();
+        let field = |seed: f64| -> Vec<f64> {
+            (0..2 * nodes).map(|i| (seed + 0.37 * i as f64).sin()).collect()
+        };
+        let (acceleration, velocity) = (field(0.1), field(2.0));
+        for basis in [Basis::Mpm, Basis::Gimp] {
+            let influences = basis::map_points(&grid, basis, &points).expect("inside");
+            let groups = Groups::new(&influences);
+            let group_nodes: Vec<u32> = groups.nodes.iter().map(|&node| node as u32).collect();
+            let border = Border::new(std::iter::repeat_n(false, groups.len()));
+            let step = StepPoints {
+                points: &points,
+                materials: &[],
+                influences: &influences,
+                groups: &groups,
+                group_nodes: &group_nodes,
+                border: &border,
+                volume: PointVolume::default(),
+            };
+            for external in [&external[..], &[]] {
+                let (mut momenta, mut forces) = (vec![[0.0; 2]; nodes], vec![[0.0; 2]; nodes]);
+                for part in [0..17, 17..40] {
+                    add_momentum_and_force(step, part, external, &mut momenta, &mut forces);
+                }
+                assert_eq!(momenta, momentum(step, &points.velocity, nodes));
+                assert_eq!(forces, force(step, external, &[], nodes));
+            }
+            let (a, v) = (at_points(step, &acceleration), at_points(step, &velocity));
+            for share in [1.0, 0.4, 0.0] {
+                let mut pushed = Pushed::zeros(points.len());
+                for part in [25..40, 0..25] {
+                    pushed.push(step, part, [&velocity, &acceleration], share, 0.01);
+                }
+                assert_eq!(pushed.rate, a);
+                for p in 0..points.len() {
+                    for i in 0..2 {
+                        let flip = points.velocity[p][i] + 0.01 * a[p][i];
+                        let mixed = share * flip + (1.0 - share) * v[p][i];
+                        assert!(
+                            (pushed.velocity[p][i] - mixed).abs() < 1e-15 * (1.0 + mixed.abs())
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

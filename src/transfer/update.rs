@@ -1,0 +1,389 @@
+//! Grid to points at the end of a step (Ghost Figure 1 e, f; Lagrangian eq. 16, 31): deformation,
+//! stress, position, domain. A step that would leave an unsound point is refused as a whole.
+
+use std::cell::Cell;
+
+use nalgebra::Matrix3;
+
+use crate::basis::domain::update_domains;
+use crate::basis::{cpdi1, cpdi2};
+use crate::deck::model::{Basis, DomainUpdate};
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::material::Material;
+use crate::mechanics::{self, BATCH, StepStart, StressState};
+use crate::parallel::World;
+use crate::points::Points;
+use crate::system::numbering::Numbering;
+use crate::system::terms::stress::{StepPoints, deformation_increment};
+use crate::tensor::{self, Spectrum};
+
+use super::undo::{Former, Snapshot};
+
+/// Increments at each point of this rank, computed but not yet applied.
+pub struct Increments<const D: usize> {
+    /// dF
+    pub deformation: Vec<[[f64; D]; D]>,
+    /// m
+    pub displacement: Vec<[f64; D]>,
+    /// Where the corners of `cpdi2` domains go, m; empty until [`unsound_domain`] has found it.
+    pub corners: Vec<[[f64; D]; 8]>,
+}
+
+/// Energies of this rank's points, J (J/m in plane strain).
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct PointEnergies {
+    pub strain: f64,
+    /// Dissipated since the start.
+    pub plastic: f64,
+    pub kinetic: f64,
+}
+
+/// Maps nodal increments (local nodes) to the points.
+pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64]) -> Increments<D> {
+    let count = step.points.len();
+    let mut made = Increments {
+        deformation: Vec::with_capacity(count),
+        displacement: Vec::with_capacity(count),
+        corners: Vec::new(),
+    };
+    for p in 0..count {
+        let row = step.influences.row(p);
+        let nodes = step.nodes_of(p);
+        let nodal = |a: usize| -> [f64; D] {
+            let start = nodes[a] as usize * D;
+            std::array::from_fn(|i| displacement[start + i])
+        };
+        made.deformation
+            .push(deformation_increment(&step.influences.gradients[row.clone()], nodal));
+        let mut moved = [0.0; D];
+        for (a, weight) in step.influences.weights[row].iter().enumerate() {
+            for (m, u) in moved.iter_mut().zip(nodal(a)) {
+                *m += weight * u;
+            }
+        }
+        made.displacement.push(moved);
+    }
+    made
+}
+
+/// Why a step cannot be applied, the same on every rank.
+#[derive(Debug)]
+pub struct Refusal {
+    pub why: String,
+    /// It turns a point inside out.
+    pub inverted: bool,
+}
+
+/// Says why the increments cannot be accepted, if so: a NaN, an inverted point, a point outside
+/// the grid (as it is after the step). Collective.
+pub fn reason_to_refuse<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    points: &Points<D>,
+    increments: &Increments<D>,
+) -> Option<Refusal> {
+    // Neighbours in the list are mostly neighbours in space.
+    let near = Cell::new(None);
+    refused(world, points, |p| {
+        let x = points.position[p];
+        let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
+        if moved.iter().any(|m| !m.is_finite()) {
+            return Some(Fault::NotFinite);
+        }
+        let fault = fault_of(&increments.deformation[p]);
+        fault.or_else(|| {
+            near.set(grid.locate_near(&moved, near.get()));
+            near.get().is_none().then(|| Fault::Leaves(format!("{moved:?}")))
+        })
+    })
+}
+
+/// [`reason_to_refuse`] of dF alone. Collective.
+pub fn deformation_to_refuse<const D: usize>(
+    world: &World,
+    points: &Points<D>,
+    deformation: &[[[f64; D]; D]],
+) -> Option<Refusal> {
+    refused(world, points, |p| fault_of(&deformation[p]))
+}
+
+/// What is wrong with the increment of a point.
+enum Fault {
+    NotFinite,
+    /// det dF
+    Inverted(f64),
+    /// To where, m.
+    Leaves(String),
+}
+
+fn fault_of<const D: usize>(increment: &[[f64; D]; D]) -> Option<Fault> {
+    let determinant = tensor::dense::determinant(increment);
+    if !determinant.is_finite() {
+        return Some(Fault::NotFinite);
+    }
+    (determinant <= 0.0).then_some(Fault::Inverted(determinant))
+}
+
+/// The first point of the lowest rank with a fault. Collective.
+fn refused<const D: usize>(
+    world: &World,
+    points: &Points<D>,
+    fault: impl Fn(usize) -> Option<Fault>,
+) -> Option<Refusal> {
+    let found = (0..points.len()).find_map(|p| fault(p).map(|fault| (p, fault)));
+    let inverted = matches!(found, Some((_, Fault::Inverted(_))));
+    let message = found.map(|(p, fault)| {
+        let what = match fault {
+            Fault::NotFinite => "has a displacement that is not finite".to_string(),
+            Fault::Inverted(determinant) => {
+                format!("is turned inside out (det dF = {determinant:.3e})")
+            }
+            Fault::Leaves(place) => format!("leaves the grid: it would move to {place}"),
+        };
+        format!("point {} at {:?} {what}", points.id[p], points.position[p])
+    });
+    let why = world.first_message(message)?;
+    Some(Refusal { why, inverted: world.any(inverted) })
+}
+
+/// The first point of this rank whose state is not a number, if any.
+pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
+    let p = (0..points.len()).find(|&p| {
+        let sound = points.velocity[p].iter().chain(&points.kirchhoff_stress[p]);
+        !sound.chain(&points.position[p]).all(|value| value.is_finite())
+    })?;
+    Some(format!(
+        "point {} at {:?} m has velocity {:?} m/s, which with its stress is not finite",
+        points.id[p], points.position[p], points.velocity[p]
+    ))
+}
+
+/// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
+/// step, if any; otherwise `increments` learn where the corners of `cpdi2` go. `displacement`: local
+/// nodes, m. Collective.
+pub fn unsound_domain<const D: usize>(
+    world: &World,
+    [grid, after]: [&Grid<D>; 2],
+    basis: Basis,
+    numbering: &Numbering,
+    displacement: &[f64],
+    points: &Points<D>,
+    increments: &mut Increments<D>,
+) -> Option<String> {
+    if !matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
+        return None;
+    }
+    let nodal = |node| nodal_displacement(numbering, displacement, node);
+    let mut hint = None;
+    let mut check = |p: usize| -> Result<()> {
+        if basis == Basis::Cpdi2 {
+            let grids = [grid, after];
+            increments.corners.push(cpdi2::moved_corners(grids, points, p, &mut hint, &nodal)?);
+            return Ok(());
+        }
+        let (increment, moved) = (&increments.deformation[p], &increments.displacement[p]);
+        cpdi1::check_step(after, points, p, increment, moved, &mut hint)
+    };
+    let reason = (0..points.len()).find_map(|p| check(p).err());
+    world.first_message(reason.map(|error| error.to_string()))
+}
+
+/// m; zero where no equation lives.
+fn nodal_displacement<const D: usize>(
+    numbering: &Numbering,
+    displacement: &[f64],
+    node: usize,
+) -> [f64; D] {
+    match numbering.local(node) {
+        Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
+        None => [0.0; D],
+    }
+}
+
+/// Applies the increments: F, b_e, stress, history, domains, positions. What they overwrite is kept
+/// where a snapshot `before` is given, here and below.
+#[allow(clippy::too_many_arguments)]
+pub fn apply<const D: usize>(
+    grid: &Grid<D>,
+    materials: &[Material],
+    basis: Basis,
+    rule: DomainUpdate,
+    numbering: &Numbering,
+    displacement: &[f64],
+    increments: &Increments<D>,
+    points: &mut Points<D>,
+    mut before: Option<&mut Snapshot<D>>,
+) -> Result<()> {
+    deform(materials, &increments.deformation, points, before.as_deref_mut());
+    let kept = before.as_deref_mut();
+    follow(grid, basis, rule, numbering, displacement, increments, points, kept)?;
+    move_points(&increments.displacement, points, before);
+    Ok(())
+}
+
+/// F, b_e, stress and history for the increments dF (Lagrangian eq. 16); returns the energies
+/// of the new state, all but the kinetic one.
+pub fn deform<const D: usize>(
+    materials: &[Material],
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+    mut before: Option<&mut Snapshot<D>>,
+) -> PointEnergies {
+    stretch(increments, points, before.as_deref_mut());
+    respond(materials, increments, points, before)
+}
+
+/// F of the increments dF alone: what [`follow`] reads.
+pub fn stretch<const D: usize>(
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+    before: Option<&mut Snapshot<D>>,
+) {
+    let after = |old: &Matrix3<f64>, increment: &[[f64; D]; D]| {
+        // The rows and columns beyond D are those of the identity.
+        let mut gradient = *old;
+        for j in 0..3 {
+            for i in 0..D {
+                gradient[(i, j)] = (0..D).map(|k| increment[i][k] * old[(k, j)]).sum();
+            }
+        }
+        gradient
+    };
+    overwrite(
+        &mut points.deformation_gradient,
+        before.map(|before| &mut before.deformation_gradient),
+        increments,
+        after,
+    );
+}
+
+/// Each value of an array from the old one and what it meets in `with`.
+fn overwrite<T: Copy, W>(
+    values: &mut Vec<T>,
+    former: Option<&mut Former<T>>,
+    with: &[W],
+    after: impl Fn(&T, &W) -> T,
+) {
+    match former {
+        Some(former) => {
+            former.set_aside(values);
+            for ((value, old), with) in values.iter_mut().zip(former.values()).zip(with) {
+                *value = after(old, with);
+            }
+        }
+        None => {
+            for (value, with) in values.iter_mut().zip(with) {
+                *value = after(value, with);
+            }
+        }
+    }
+}
+
+/// b_e, stress and history of the increments dF; energies as [`deform`] returns them.
+pub fn respond<const D: usize>(
+    materials: &[Material],
+    increments: &[[[f64; D]; D]],
+    points: &mut Points<D>,
+    mut before: Option<&mut Snapshot<D>>,
+) -> PointEnergies {
+    if let Some(before) = &mut before {
+        before.elastic_left_cauchy_green.set_aside(&mut points.elastic_left_cauchy_green);
+        before.kirchhoff_stress.set_aside(&mut points.kirchhoff_stress);
+        before.plastic_strain.set_aside(&mut points.plastic_strain);
+        before.dissipation.set_aside(&mut points.dissipation);
+    }
+    let before = before.as_deref();
+    let mut sum = PointEnergies::default();
+    let mut states = [StressState::default(); BATCH];
+    for (batch, increments) in increments.chunks(BATCH).enumerate() {
+        let first = batch * BATCH;
+        let elastic = match before {
+            Some(before) => before.elastic_left_cauchy_green.values(),
+            None => &points.elastic_left_cauchy_green,
+        };
+        let start = |k: usize| StepStart {
+            material: &materials[points.body[first + k] as usize],
+            deformation_gradient: &points.deformation_gradient[first + k],
+            elastic_left_cauchy_green: &elastic[first + k],
+            volume_initial: points.volume_initial[first + k],
+        };
+        mechanics::stresses(start, increments, &mut states);
+        for (p, state) in (first..first + increments.len()).zip(&states) {
+            let (strain, lost) = match before {
+                Some(before) => (before.plastic_strain.values()[p], before.dissipation.values()[p]),
+                None => (points.plastic_strain[p], points.dissipation[p]),
+            };
+            points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
+            points.kirchhoff_stress[p] = state.kirchhoff_stress;
+            points.plastic_strain[p] = strain + state.plastic_increment;
+            points.dissipation[p] = lost + state.dissipation;
+            sum.strain += state.stored_energy * points.volume_initial[p];
+            sum.plastic += points.dissipation[p] * points.volume_initial[p];
+        }
+    }
+    sum
+}
+
+/// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
+/// those of the step's start. `displacement` is the one that made the increments, which
+/// [`unsound_domain`] has passed.
+#[allow(clippy::too_many_arguments)]
+pub fn follow<const D: usize>(
+    grid: &Grid<D>,
+    basis: Basis,
+    rule: DomainUpdate,
+    numbering: &Numbering,
+    displacement: &[f64],
+    increments: &Increments<D>,
+    points: &mut Points<D>,
+    before: Option<&mut Snapshot<D>>,
+) -> Result<()> {
+    if let Some(before) = before {
+        before.half_length.copy(&points.half_length);
+        if basis == Basis::Cpdi2 {
+            before.corners.set_aside(&mut points.corners);
+        }
+    }
+    if basis == Basis::Cpdi2 {
+        points.corners.copy_from_slice(&increments.corners);
+    }
+    let whole: Vec<Matrix3<f64>> = match rule {
+        DomainUpdate::NormalIncremental => increments.deformation.iter().map(embed).collect(),
+        _ => Vec::new(),
+    };
+    let nodal = |node| nodal_displacement(numbering, displacement, node);
+    update_domains(grid, basis, rule, points, &whole, &nodal)
+}
+
+/// Lagrangian eq. 31, Ghost eq. 9, 14.
+pub fn move_points<const D: usize>(
+    displacement: &[[f64; D]],
+    points: &mut Points<D>,
+    before: Option<&mut Snapshot<D>>,
+) {
+    let former = before.map(|before| &mut before.position);
+    overwrite(&mut points.position, former, displacement, |x, moved| {
+        std::array::from_fn(|i| x[i] + moved[i])
+    });
+}
+
+/// dF of plane strain has dF_zz = 1.
+fn embed<const D: usize>(increment: &[[f64; D]; D]) -> Matrix3<f64> {
+    tensor::dense::embed(increment, 1.0)
+}
+
+/// Energies of this rank's points at their present state.
+pub fn energies<const D: usize>(points: &Points<D>, materials: &[Material]) -> PointEnergies {
+    let mut sum = PointEnergies::default();
+    for p in 0..points.len() {
+        let elasticity = materials[points.body[p] as usize].elasticity();
+        let strain =
+            Spectrum::of(&points.elastic_left_cauchy_green[p]).values.map(|b| 0.5 * b.ln());
+        sum.strain += elasticity.energy(strain) * points.volume_initial[p];
+        sum.plastic += points.dissipation[p] * points.volume_initial[p];
+        let speed: f64 = points.velocity[p].iter().map(|v| v * v).sum();
+        sum.kinetic += 0.5 * points.mass[p] * speed;
+    }
+    sum
+}
