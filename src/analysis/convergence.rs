@@ -10,11 +10,12 @@ pub(crate) fn converges_next(errors: &[f64], tolerance: f64) -> bool {
     last * factor.powf(1.5) <= tolerance || 10.0 * last * last <= tolerance
 }
 
-/// The last three errors are not below half of the least before them.
-pub(crate) fn no_longer_falls(errors: &[f64]) -> bool {
-    let Some((before, last)) = errors.split_last_chunk::<3>() else { return false };
-    let least = |errors: &[f64]| errors.iter().fold(f64::INFINITY, |a, &b| a.min(b));
-    !before.is_empty() && last.iter().all(|e| e.is_finite()) && least(last) > 0.5 * least(before)
+/// The last error is not below a tenth of the least before it: Newton's method, where it works,
+/// falls faster near its end.
+pub(crate) fn hardly_falls(errors: &[f64]) -> bool {
+    let Some((last, before)) = errors.split_last() else { return false };
+    let least = before.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    !before.is_empty() && *last > 0.1 * least
 }
 
 #[cfg(test)]
@@ -37,13 +38,13 @@ mod tests {
     }
 
     #[test]
-    fn errors_that_no_longer_fall() {
-        assert!(no_longer_falls(&[1.0, 1e-3, 2e-9, 3e-9, 1.1e-9, 4e-9]));
-        // Still on the way, by large steps or small ones.
-        assert!(!no_longer_falls(&[1.0, 1e-3, 1e-7, 2e-14]));
-        assert!(!no_longer_falls(&[1.0, 0.7, 0.5, 0.4, 0.3, 0.2]));
+    fn errors_that_hardly_fall() {
+        assert!(hardly_falls(&[1.0, 1e-3, 2e-9, 3e-9]));
+        assert!(hardly_falls(&[0.0, 0.8]));
+        // Still on the way.
+        assert!(!hardly_falls(&[1.0, 1e-3, 1e-7, 2e-14]));
         // Too few, or not numbers.
-        assert!(!no_longer_falls(&[1e-9, 1e-9, 1e-9]));
-        assert!(!no_longer_falls(&[1e-9, 1e-9, 1e-9, f64::NAN]));
+        assert!(!hardly_falls(&[1e-9]));
+        assert!(!hardly_falls(&[1e-9, 1e-9, f64::NAN]));
     }
 }

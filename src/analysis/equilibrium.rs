@@ -24,7 +24,8 @@ use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
 use crate::system::terms::stress::{self, Health, StepPoints};
 
-use super::convergence::{converges_next, no_longer_falls};
+use super::convergence::{converges_next, hardly_falls};
+use super::round_off;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::linear::{GhostTerm, Inertia};
 
@@ -66,12 +67,16 @@ pub struct Equilibrium<'a, const D: usize> {
     internal_start: Vec<f64>,
     reaction_owned: Vec<f64>,
     diagonal_scale: f64,
+    /// Largest free diagonal entry of the step's first tangent, N/m.
+    diagonal_largest: f64,
     /// Normalised error of each evaluation that was accepted.
     pub errors: Vec<f64>,
     /// Numerator of the last, N.
     residual_norm: f64,
     /// Its denominator, N.
     actions_norm: f64,
+    /// The step ends above the tolerance, at the round-off of its equations.
+    pub at_round_off: bool,
     /// Health of the last evaluation on this rank.
     pub health: Health,
     /// Wall time of all evaluations, s.
@@ -136,9 +141,11 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             assembly_seconds: 0.0,
             reaction_owned: vec![0.0; owned],
             diagonal_scale: 0.0,
+            diagonal_largest: 0.0,
             errors: Vec::new(),
             residual_norm: 0.0,
             actions_norm: 0.0,
+            at_round_off: false,
             health: Health::default(),
         })
     }
@@ -269,7 +276,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             inertia.join(self.pattern, numbering.owned, &mut rows);
         }
         if self.diagonal_scale == 0.0 {
-            self.diagonal_scale = mean_diagonal(
+            (self.diagonal_scale, self.diagonal_largest) = free_diagonal(
                 self.world,
                 numbering.owned,
                 self.pattern,
@@ -315,14 +322,35 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         converges_next(&self.errors, self.settings.tolerance)
     }
 
-    /// Whether the error has stopped falling, at the round-off of the forces that the residual is
-    /// the difference of: no better solver or smaller step would bring it down.
-    pub fn stuck_at_round_off(&self) -> bool {
-        let cell = self.grid.cell_size();
-        // Strains carry the round-off of F = 1 + grad u, forces that of stresses on a cell.
-        let strained = self.diagonal_scale * cell * ((self.numbering.total * D) as f64).sqrt();
-        let round_off = f64::EPSILON * (strained + self.actions_norm);
-        no_longer_falls(&self.errors) && self.residual_norm <= NEAR * round_off
+    /// Whether the residual is at the round-off of the terms it is the sum of, everywhere: no better
+    /// solver or smaller step would bring it down ([`round_off`]). Collective.
+    fn is_round_off(&self) -> Result<bool> {
+        // Sizes take a pass over the points. A residual far above those of strains and moves of a
+        // whole cell in the stiffest place needs none.
+        let (cell, count) = (self.grid.cell_size(), (self.numbering.total * D) as f64);
+        let largest = self.diagonal_largest * cell * count.sqrt() + self.actions_norm;
+        let moves = self.world.max(self.displacement.iter().fold(0.0, |m, u| u.abs().max(m)));
+        if !round_off::explains(largest * (1.0 + moves / cell), self.residual_norm) {
+            return Ok(false);
+        }
+        let (numbering, pattern) = (self.numbering, self.pattern);
+        let mut size = round_off::sizes(self.step, &self.displacement, numbering.len());
+        numbering.halo.reverse_add(self.world, &mut size, 1)?;
+        size.truncate(numbering.owned);
+        let norm = |u: &[f64]| u.iter().map(|u| u * u).sum::<f64>().sqrt();
+        let moved: Vec<f64> = self.displacement.chunks_exact(D).map(norm).collect();
+        if let Some(ghost) = &self.ghost {
+            ghost.add_size(pattern, &moved, &mut size);
+        }
+        if let Some(inertia) = &self.inertia {
+            inertia.add_size(pattern, &moved, &mut size);
+        }
+        let explained = self.counted().all(|dof| {
+            let action = self.external_owned[dof] + self.reaction_owned[dof];
+            let size = size[dof / D] + self.external_owned[dof].abs() + action.abs();
+            round_off::explains(size, action - self.internal_owned[dof])
+        });
+        Ok(!self.world.any(!explained))
     }
 
     /// f_react = f_int(old) + K (x - x_old) - f_ext on the fixed degrees of freedom.
@@ -338,22 +366,31 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         Ok(())
     }
 
-    /// Lagrangian eq. 40. Degrees of freedom left out carry no equation and do not count.
+    /// Owned degrees of freedom but those left out, which carry no equation.
+    fn counted(&self) -> impl Iterator<Item = usize> {
+        let mut next_fixed = self.held.fixed().peekable();
+        (0..self.external_owned.len()).filter(move |&dof| {
+            let fixed = next_fixed.next_if_eq(&dof).is_some();
+            fixed || !self.held.holds(dof)
+        })
+    }
+
+    /// Lagrangian eq. 40; 1 where a residual stands against no action at all, 0 where there is
+    /// neither.
     fn normalised_error(&mut self) -> f64 {
         let (mut residual, mut actions) = (0.0, 0.0);
-        let mut next_fixed = self.held.fixed().peekable();
-        for dof in 0..self.external_owned.len() {
-            let fixed = next_fixed.next_if_eq(&dof).is_some();
-            if self.held.holds(dof) && !fixed {
-                continue;
-            }
+        for dof in self.counted() {
             let action = self.external_owned[dof] + self.reaction_owned[dof];
             residual += (action - self.internal_owned[dof]).powi(2);
             actions += action * action;
         }
         let sums = self.world.sum_slice(&[residual, actions]);
         (self.residual_norm, self.actions_norm) = (sums[0].sqrt(), sums[1].sqrt());
-        self.residual_norm / (self.actions_norm + f64::EPSILON)
+        match (self.residual_norm, self.actions_norm) {
+            (0.0, 0.0) => 0.0,
+            (residual, 0.0) if residual.is_finite() => 1.0,
+            (residual, actions) => residual / actions,
+        }
     }
 }
 
@@ -411,11 +448,15 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         self.errors.push(error);
         self.previous_owned.copy_from_slice(x);
         self.internal_previous.copy_from_slice(&self.internal_owned);
+        let last = iteration + 1 >= self.settings.max_evaluations;
         Ok(if !error.is_finite() {
             Verdict::Diverged("the residual is not finite".into())
         } else if iteration > 0 && error <= self.settings.tolerance {
             Verdict::Converged
-        } else if iteration + 1 >= self.settings.max_evaluations {
+        } else if iteration > 0 && (hardly_falls(&self.errors) || last) && self.is_round_off()? {
+            self.at_round_off = true;
+            Verdict::Converged
+        } else if last {
             Verdict::Diverged(format!(
                 "residual {error:.3e} after {} evaluations, tolerance {:.1e}",
                 iteration + 1,
@@ -442,27 +483,27 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 }
 
-/// Residuals below so many times the estimated round-off can be nothing else.
-const NEAR: f64 = 1e3;
-
-/// Mean size of the free diagonal entries over all ranks; 1 where there are none. Collective.
-fn mean_diagonal<const D: usize, R: BlockRows<D>>(
+/// Mean and largest size of the free diagonal entries over all ranks; 1 where there are none.
+/// Collective.
+fn free_diagonal<const D: usize, R: BlockRows<D>>(
     world: &World,
     owned: usize,
     pattern: &Pattern,
     free: impl Fn(usize) -> bool,
     rows: &mut R,
-) -> f64 {
-    let (mut sum, mut count) = (0.0, 0usize);
+) -> (f64, f64) {
+    let (mut sum, mut count, mut largest) = (0.0, 0usize, 0.0f64);
     for row in 0..owned {
         let range = pattern.offsets[row]..pattern.offsets[row + 1];
         let Some(position) = pattern.diagonal(row) else { continue };
         let start = rows.start(pattern, row) + (position - range.start) * D;
         for i in (0..D).filter(|i| free(row * D + i)) {
-            sum += rows.values(start + i * (range.len() * D + 1), 1)[0].abs();
+            let entry = rows.values(start + i * (range.len() * D + 1), 1)[0].abs();
+            sum += entry;
+            largest = largest.max(entry);
             count += 1;
         }
     }
     let (sum, count) = (world.sum(sum), world.sum_usize(count));
-    if count > 0 && sum > 0.0 { sum / count as f64 } else { 1.0 }
+    if count > 0 && sum > 0.0 { (sum / count as f64, world.max(largest)) } else { (1.0, 1.0) }
 }

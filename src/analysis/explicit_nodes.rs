@@ -213,7 +213,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
             velocity.to_vec()
         };
         deforming.iter_mut().for_each(|v| *v *= self.dt);
-        let deformation = mapping::deformation_increments(step, &deforming);
+        let deformation = mapping::displacement_gradients(step, &deforming);
         if let Some(refusal) = update::deformation_to_refuse(self.world, points, &deformation) {
             return Err(refusal.into());
         }

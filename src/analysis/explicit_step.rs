@@ -11,7 +11,6 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
-use crate::tensor::dense::identity;
 
 use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
 use super::step_end::Solved;
@@ -164,7 +163,7 @@ fn increments<const D: usize>(
     }
     Increments {
         deformation: deformation
-            .unwrap_or_else(|| mapping::deformation_increments(step, deforming)),
+            .unwrap_or_else(|| mapping::displacement_gradients(step, deforming)),
         displacement: mapping::at_points(step, moved),
         corners: Vec::new(),
     }
@@ -186,7 +185,7 @@ fn refuse<const D: usize>(
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
     let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
-        deformation: vec![identity(); points.len()],
+        deformation: vec![[[0.0; D]; D]; points.len()],
         displacement: made.displacement.clone(),
         corners: Vec::new(),
     });

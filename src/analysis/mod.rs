@@ -25,6 +25,7 @@ pub mod load_steps;
 pub mod newmark;
 pub mod newton;
 pub mod quasi_static;
+pub mod round_off;
 pub mod solver;
 pub mod step_end;
 pub mod time_steps;

@@ -87,11 +87,15 @@ pub fn solve<const D: usize>(
     clock.add(Phase::Solve, clock.elapsed() - before - assembled);
 
     recorder.iterations(world, number, &problem.errors)?;
-    recorder.stuck_at_round_off = !outcome.converged && problem.stuck_at_round_off();
     if !outcome.converged {
         let point = problem.refused_point(points);
         let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
         return Ok(Err(format!("Newton's method failed ({}){detail}", outcome.reason)));
+    }
+    let residual = problem.errors.last().copied().unwrap_or(0.0);
+    if problem.at_round_off {
+        let detail = format!("(residual {residual:.1e})");
+        recorder.log.warn_of_step(number, AT_ROUND_OFF, &detail);
     }
     recorder.newton.add(problem.errors.len());
     recorder.linear.add(outcome.linear_iterations_total);
@@ -100,11 +104,14 @@ pub fn solve<const D: usize>(
         internal: problem.internal_force().to_vec(),
         internal_start: problem.internal_force_at_start().to_vec(),
         ghost_energy: world.sum(problem.ghost_energy()),
-        residual: problem.errors.last().copied().unwrap_or(0.0),
+        residual,
         evaluations: problem.errors.len(),
         linear_iterations: outcome.linear_iterations_total,
     }))
 }
+
+const AT_ROUND_OFF: &str = "the residual is above analysis.tolerance and all of it round-off: it is at \
+     most what rounding leaves of the forces it is the difference of. The step counts as converged";
 
 /// What a converged step does to points and grid, not yet applied.
 pub struct Carried<const D: usize> {

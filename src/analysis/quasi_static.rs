@@ -265,7 +265,7 @@ pub fn figures<const D: usize>(
         verify::manufactured(&mut figures, world, field, materials, points, factor, time);
     }
     for warning in &figures.warnings {
-        recorder.log.say(warning);
+        recorder.log.warn(warning);
     }
     Ok(figures.values)
 }

@@ -35,14 +35,14 @@ impl Manufactured {
         scope: &Scope,
     ) -> ([f64; D], Matrix3<f64>) {
         let jets: [Jet; D] = self.jets(scope);
-        let unstrained = Matrix3::identity();
+        let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
         let start = StepStart {
             material,
-            deformation_gradient: &unstrained,
-            elastic_left_cauchy_green: &unstrained,
+            deformation_gradient: &unit,
+            elastic_excess: &none,
             volume_initial: 1.0,
         };
-        let state = mechanics::stress(&start, &deformation_gradient(&jets));
+        let state = mechanics::stress(&start, &displacement_gradient(&jets));
         (jets.map(|jet| jet.value), state.kirchhoff_stress)
     }
 
@@ -54,12 +54,12 @@ impl Manufactured {
     /// makes the material yield there (the force would depend on the path), or turns it over.
     pub fn force<const D: usize>(&self, material: &Material, scope: &Scope) -> Result<[f64; D]> {
         let jets: [Jet; D] = self.jets(scope);
-        let gradient = deformation_gradient(&jets);
-        let unstrained = Matrix3::identity();
+        let gradient = displacement_gradient(&jets);
+        let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
         let start = StepStart {
             material,
-            deformation_gradient: &unstrained,
-            elastic_left_cauchy_green: &unstrained,
+            deformation_gradient: &unit,
+            elastic_excess: &none,
             volume_initial: 1.0,
         };
         let (contribution, state) = mechanics::contribution(Frame::Total, &start, &gradient);
@@ -91,11 +91,9 @@ impl Manufactured {
     }
 }
 
-/// F = 1 + du/dX.
-fn deformation_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
-    std::array::from_fn(|k| {
-        std::array::from_fn(|l| jets[k].first[l] + if k == l { 1.0 } else { 0.0 })
-    })
+/// F - 1 = du/dX.
+fn displacement_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
+    std::array::from_fn(|k| std::array::from_fn(|l| jets[k].first[l]))
 }
 
 #[cfg(test)]
@@ -105,12 +103,12 @@ mod tests {
 
     fn first_piola(material: &Material, field: &[Expression], scope: &Scope) -> [[f64; 2]; 2] {
         let made = Manufactured::new(field).expect("smooth");
-        let gradient = deformation_gradient::<2>(&made.jets(scope));
-        let unit = Matrix3::identity();
+        let gradient = displacement_gradient::<2>(&made.jets(scope));
+        let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
         let start = StepStart {
             material,
             deformation_gradient: &unit,
-            elastic_left_cauchy_green: &unit,
+            elastic_excess: &none,
             volume_initial: 1.0,
         };
         mechanics::contribution(Frame::Total, &start, &gradient).0.stress

@@ -47,7 +47,8 @@ pub struct Contribution<const D: usize> {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StressState {
     pub kirchhoff_stress: Matrix3<f64>,
-    pub elastic_left_cauchy_green: Matrix3<f64>,
+    /// b_e - 1
+    pub elastic_excess: Matrix3<f64>,
     pub plastic_increment: f64,
     pub dissipation: f64,
     /// Stored energy per unit of initial volume, J/m3.
@@ -60,13 +61,13 @@ pub struct StepStart<'a> {
     pub material: &'a Material,
     /// F_n
     pub deformation_gradient: &'a Matrix3<f64>,
-    /// b_e at the start of the step
-    pub elastic_left_cauchy_green: &'a Matrix3<f64>,
+    /// b_e - 1 at the start of the step
+    pub elastic_excess: &'a Matrix3<f64>,
     /// V0, m3
     pub volume_initial: f64,
 }
 
-/// Stress only (explicit steps, last evaluation). det dF < 0 is taken as it comes; a singular
+/// Stress only (explicit steps, last evaluation) for the increment dF - 1. det dF < 0 is taken as it comes; a singular
 /// or not finite dF gives stresses that are not finite.
 #[inline]
 pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> StressState {
@@ -83,7 +84,7 @@ pub fn stresses<'a, const D: usize>(
     update::states(start, increments, out);
 }
 
-/// Stress and tangent in `frame` for the increment dF = 1 + d(du)/dX~ (Lagrangian eq. 7).
+/// Stress and tangent in `frame` for the increment dF - 1 = d(du)/dX~ (Lagrangian eq. 7).
 /// Plane strain for D = 2: dF_zz = 1. Limits as in [`stress`].
 #[inline(always)]
 pub fn contribution<const D: usize>(
@@ -92,7 +93,7 @@ pub fn contribution<const D: usize>(
     increment: &[[f64; D]; D],
 ) -> (Contribution<D>, StressState) {
     let update = update::update(start, increment);
-    let placement = Placement::new(frame, start, increment);
+    let placement = Placement::new(frame, start, &dense::plus_unit(increment));
     let (stress, tangent) = tangent::pull_back(&update, &placement.back, placement.scale);
     let contribution = Contribution {
         stress,

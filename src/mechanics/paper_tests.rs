@@ -107,7 +107,7 @@ fn check<const D: usize>(case: &Case<D>) {
     let inverse = increment.try_inverse().expect("the increment is regular");
     let start_det = case.gradient.determinant();
     let det = increment.determinant() * start_det;
-    let trial = increment * case.elastic * increment.transpose();
+    let trial = increment * case.elastic() * increment.transpose();
     let (tau, moduli) = small_strain(&case.material, &(logarithm(&trial) * 0.5));
     let half = contract(&moduli, &logarithm_derivative(&trial));
 
@@ -122,7 +122,7 @@ fn check<const D: usize>(case: &Case<D>) {
 
     // (A.3)-(A.6)
     let mut change = Fourth::default();
-    let (right, left) = (case.elastic * increment.transpose(), increment * case.elastic);
+    let (right, left) = (case.elastic() * increment.transpose(), increment * case.elastic());
     fill(&mut change, |i, j, k, l| delta(i, k) * right[(l, j)] + left[(i, l)] * delta(j, k));
     let rate = contract(&half, &change);
     let mut previous = Fourth::default();

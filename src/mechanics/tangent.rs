@@ -45,8 +45,8 @@ pub(crate) fn pull_back<const D: usize>(
             if a != b {
                 let rate = scale * shear_rate(update, a, b);
                 let values = &update.trial.values;
-                add(&mut half[a][b], rate * values[b], &here[a], &there[b]);
-                let cross = rate * values[a] - scale * stress[a];
+                add(&mut half[a][b], rate * (1.0 + values[b]), &here[a], &there[b]);
+                let cross = rate * (1.0 + values[a]) - scale * stress[a];
                 add(&mut half[a][b], cross, &here[b], &there[a]);
             }
         }

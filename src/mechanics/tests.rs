@@ -47,11 +47,18 @@ impl Sequence {
     }
 }
 
+/// a - 1
+fn less_unit<const D: usize>(a: &Square<D>) -> Square<D> {
+    std::array::from_fn(|i| std::array::from_fn(|j| a[i][j] - if i == j { 1.0 } else { 0.0 }))
+}
+
 /// A point at the start of a step.
 pub(crate) struct Case<const D: usize> {
     pub material: Material,
     pub gradient: Matrix3<f64>,
-    pub elastic: Matrix3<f64>,
+    /// b_e - 1
+    pub excess: Matrix3<f64>,
+    /// dF
     pub increment: Square<D>,
 }
 
@@ -61,32 +68,42 @@ impl<const D: usize> Case<D> {
         Case {
             material,
             gradient: dense::embed(&random.tensor::<D>(1.0, 0.3), 1.0),
-            elastic: random.left_cauchy_green::<D>(0.2),
+            excess: random.left_cauchy_green::<D>(0.2) - Matrix3::identity(),
             increment: random.tensor::<D>(1.0, size),
         }
     }
 
     pub fn unstrained(material: Material, increment: Square<D>) -> Self {
-        let one = Matrix3::identity();
-        Case { material, gradient: one, elastic: one, increment }
+        let gradient = Matrix3::identity();
+        Case { material, gradient, excess: Matrix3::zeros(), increment }
+    }
+
+    /// b_e
+    pub fn elastic(&self) -> Matrix3<f64> {
+        Matrix3::identity() + self.excess
+    }
+
+    /// dF - 1
+    pub fn moved(&self) -> Square<D> {
+        less_unit(&self.increment)
     }
 
     pub fn start(&self) -> StepStart<'_> {
         StepStart {
             material: &self.material,
             deformation_gradient: &self.gradient,
-            elastic_left_cauchy_green: &self.elastic,
+            elastic_excess: &self.excess,
             volume_initial: 0.7,
         }
     }
 
     pub fn contribution(&self, frame: Frame) -> (Contribution<D>, StressState) {
-        contribution(frame, &self.start(), &self.increment)
+        contribution(frame, &self.start(), &self.moved())
     }
 
     /// Force on a node with basis gradient `g` = dS/dX~, with the increment changed by `change`.
     fn force(&self, frame: Frame, g: &[f64; D], change: &Square<D>) -> [f64; D] {
-        let mut increment = self.increment;
+        let mut increment = self.moved();
         for i in 0..D {
             for j in 0..D {
                 increment[i][j] += change[i][j];
@@ -244,10 +261,10 @@ fn frames_agree_to_round_off() {
 #[test]
 fn stress_alone_is_the_same_stress() {
     let case = Case::<3>::random(plastic(), 5, 0.3);
-    let alone = stress(&case.start(), &case.increment);
+    let alone = stress(&case.start(), &case.moved());
     let (_, state) = case.contribution(Frame::Previous);
     assert_eq!(alone.kirchhoff_stress, state.kirchhoff_stress);
-    assert_eq!(alone.elastic_left_cauchy_green, state.elastic_left_cauchy_green);
+    assert_eq!(alone.elastic_excess, state.elastic_excess);
 }
 
 #[test]
@@ -273,6 +290,35 @@ fn hencky_simple_shear() {
 }
 
 #[test]
+fn small_strains_keep_their_digits() {
+    // Uniaxial strains of 1e-3 to 1e-20 in each of ten steps: the
+    // stress of (1 + e)^10 to thirteen digits, and b_e with it.
+    let (lambda, mu) = (100.0 * 0.3 / (1.3 * 0.4), 100.0 / 2.6);
+    let material = elastic();
+    for e in [1e-3, 1e-7, 1e-12, 1e-20] {
+        let mut state = StressState::default();
+        let (gradient, mut excess) = (Matrix3::identity(), Matrix3::zeros());
+        for _ in 0..10 {
+            let start = StepStart {
+                material: &material,
+                deformation_gradient: &gradient,
+                elastic_excess: &excess,
+                volume_initial: 1.0,
+            };
+            let (contribution, now) = contribution(Frame::Updated, &start, &[[e, 0.0], [0.0, 0.0]]);
+            assert!((contribution.stress[0][0] / now.kirchhoff_stress[(0, 0)] - 1.0).abs() < 2e-3);
+            (state, excess) = (now, now.elastic_excess);
+        }
+        let strain = 10.0 * e.ln_1p();
+        for (axis, modulus) in [(0, lambda + 2.0 * mu), (1, lambda), (2, lambda)] {
+            let ratio = state.kirchhoff_stress[(axis, axis)] / (modulus * strain);
+            assert!((ratio - 1.0).abs() < 1e-13, "{e} {axis}: {ratio}");
+        }
+        assert!((excess[(0, 0)] / (2.0 * strain).exp_m1() - 1.0).abs() < 1e-13, "{e}");
+    }
+}
+
+#[test]
 fn von_mises_uniaxial_strain() {
     // F = diag(s, 1, 1): tau_xx = K ln s + rho sqrt(2/3) beyond yield.
     let (bulk, mu, rho) = (100.0 / 1.2, 100.0 / 2.6, 5.0);
@@ -288,7 +334,8 @@ fn von_mises_uniaxial_strain() {
     assert!((state.dissipation - rho * flow).abs() < 1e-14);
     assert!((c.stress[0][0] - tau[(0, 0)] / s).abs() < 1e-12);
     // Plastic flow keeps the volume: det b_e = det(dF)^2.
-    assert!((state.elastic_left_cauchy_green.determinant() - s * s).abs() < 1e-13);
+    let elastic = Matrix3::identity() + state.elastic_excess;
+    assert!((elastic.determinant() - s * s).abs() < 1e-13);
 }
 
 #[test]
@@ -300,7 +347,7 @@ fn work_is_stored_or_dissipated() {
         [[1.0 + 0.2 * t, 0.5 * t], [0.1 * t, 1.0 - 0.1 * t]]
     };
     let material = plastic();
-    let (mut gradient, mut elastic) = (Matrix3::identity(), Matrix3::identity());
+    let (mut gradient, mut excess) = (Matrix3::identity(), Matrix3::zeros());
     let (mut work, mut dissipated, mut stored) = (0.0, 0.0, 0.0);
     let mut before = [[0.0; 2]; 2];
     for k in 1..=steps {
@@ -309,10 +356,11 @@ fn work_is_stored_or_dissipated() {
         let start = StepStart {
             material: &material,
             deformation_gradient: &gradient,
-            elastic_left_cauchy_green: &elastic,
+            elastic_excess: &excess,
             volume_initial: 1.0,
         };
-        let (c, state) = contribution(Frame::Total, &start, &dense::block::<2>(&(now * inverse)));
+        let increment = less_unit(&dense::block::<2>(&(now * inverse)));
+        let (c, state) = contribution(Frame::Total, &start, &increment);
         let (old, new) = (path(k - 1), path(k));
         for i in 0..2 {
             for j in 0..2 {
@@ -322,7 +370,7 @@ fn work_is_stored_or_dissipated() {
         dissipated += state.dissipation;
         stored = state.stored_energy;
         before = c.stress;
-        (gradient, elastic) = (now, state.elastic_left_cauchy_green);
+        (gradient, excess) = (now, state.elastic_excess);
     }
     assert!(dissipated > 0.3 * work);
     assert!((work - stored - dissipated).abs() < 2e-4 * work, "{work} {stored} {dissipated}");
@@ -380,11 +428,11 @@ fn a_batch_gives_each_point_what_it_gets_alone() {
             let material = |k: usize| if k.is_multiple_of(3) { elastic() } else { plastic() };
             let cases: Vec<Case<D>> =
                 (0..count).map(|k| Case::random(material(k), k as u64, 0.02 * k as f64)).collect();
-            let increments: Vec<Square<D>> = cases.iter().map(|case| case.increment).collect();
+            let increments: Vec<Square<D>> = cases.iter().map(Case::moved).collect();
             let mut states = [StressState::default(); BATCH];
             stresses(|k| cases[k].start(), &increments, &mut states);
             for (case, state) in cases.iter().zip(&states) {
-                assert_eq!(*state, stress(&case.start(), &case.increment));
+                assert_eq!(*state, stress(&case.start(), &case.moved()));
             }
             let flows =
                 states[..count].iter().filter(|state| state.plastic_increment > 0.0).count();

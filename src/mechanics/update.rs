@@ -1,5 +1,8 @@
 //! eps_e,t = 1/2 ln(dF b_e,n dF^T): the trial elastic strain (Lagrangian §2) and what the
 //! material makes of it, in principal axes.
+//!
+//! dF and b_e come and go without their units, as dF - 1 and b_e - 1: strains of 1e-7 in 1 + strain
+//! would keep nine digits only, and stiff bodies under small loads none that equilibrium needs.
 
 use nalgebra::Matrix3;
 
@@ -7,10 +10,11 @@ use super::{StepStart, StressState};
 use crate::material::{Material, Response};
 use crate::tensor::Spectrum;
 use crate::tensor::dense::{self, Square};
+use crate::tensor::spectral::ln_1p;
 
 /// The constitutive update of one point, all in the principal axes of the trial strain.
 pub(crate) struct Update {
-    /// Trial b_e: principal values b_a and axes; for D = 2 the last axis is z.
+    /// Trial b_e - 1: principal values b_a - 1 and axes; for D = 2 the last axis is z.
     pub trial: Spectrum,
     /// ln b_a
     pub logarithms: [f64; 3],
@@ -20,11 +24,18 @@ pub(crate) struct Update {
 /// Points of a batch of [`states`].
 pub const BATCH: usize = 16;
 
-/// Principal values and axes of dF b_e,n dF^T.
+/// Principal values and axes of dF b dF^T - 1 from e = b - 1 (`before`) and h = dF - 1
+/// (`increment`): with a = dF b - 1 = h + e + h e it is a + h^T + a h^T.
 #[inline(always)]
 fn trial<const D: usize>(before: &Matrix3<f64>, increment: &Square<D>) -> Spectrum {
-    let half = dense::multiply(increment, &dense::block::<D>(before));
-    let row = |i: usize, j: usize| dense::dot(&half[i], &increment[j]);
+    let mut half = dense::multiply(increment, &dense::block::<D>(before));
+    for (i, row) in half.iter_mut().enumerate() {
+        for (j, value) in row.iter_mut().enumerate() {
+            *value += increment[i][j] + before[(i, j)];
+        }
+    }
+    let row =
+        |i: usize, j: usize| half[i][j] + increment[j][i] + dense::dot(&half[i], &increment[j]);
     if D == 2 {
         Spectrum::plane(row(0, 0), row(1, 1), row(0, 1), before[(2, 2)])
     } else {
@@ -34,8 +45,8 @@ fn trial<const D: usize>(before: &Matrix3<f64>, increment: &Square<D>) -> Spectr
 
 #[inline(always)]
 pub(crate) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -> Update {
-    let trial = trial(start.elastic_left_cauchy_green, increment);
-    let logarithms = trial.values.map(f64::ln);
+    let trial = trial(start.elastic_excess, increment);
+    let logarithms = trial.values.map(ln_1p);
     let response = start.material.respond(logarithms.map(|e| 0.5 * e));
     Update { trial, logarithms, response }
 }
@@ -46,7 +57,7 @@ impl Update {
         let response = &self.response;
         StressState {
             kirchhoff_stress: self.trial.compose(response.stress),
-            elastic_left_cauchy_green: self.trial.compose(elastic_values(&self.trial, response)),
+            elastic_excess: self.trial.compose(elastic_values(&self.trial, response)),
             plastic_increment: response.plastic_increment,
             dissipation: response.dissipation,
             stored_energy: material.elasticity().energy(response.elastic_strain),
@@ -54,14 +65,14 @@ impl Update {
     }
 }
 
-/// Principal values of the new b_e. Without plastic flow they are the trial ones: no detour
+/// Principal values of the new b_e - 1. Without plastic flow they are the trial ones: no detour
 /// through ln and exp, no drift.
 #[inline(always)]
 fn elastic_values(trial: &Spectrum, response: &Response) -> [f64; 3] {
     if response.plastic_increment == 0.0 {
         trial.values
     } else {
-        response.elastic_strain.map(|e| (2.0 * e).exp())
+        response.elastic_strain.map(|e| (2.0 * e).exp_m1())
     }
 }
 
@@ -74,15 +85,15 @@ pub(crate) fn states<'a, const D: usize>(
     increments: &[Square<D>],
     out: &mut [StressState],
 ) {
-    const UNIT: Spectrum = Spectrum { values: [1.0; 3], axes: [[0.0; 3]; 3] };
-    let mut trials = [UNIT; BATCH];
+    const NONE: Spectrum = Spectrum { values: [0.0; 3], axes: [[0.0; 3]; 3] };
+    let mut trials = [NONE; BATCH];
     let trials = &mut trials[..increments.len()];
     let (mut stresses, mut values) = ([[0.0; 3]; BATCH], [[0.0; 3]; BATCH]);
     for (k, (trial_of, increment)) in trials.iter_mut().zip(increments).enumerate() {
-        *trial_of = trial(start(k).elastic_left_cauchy_green, increment);
+        *trial_of = trial(start(k).elastic_excess, increment);
     }
     for (strain, trial) in values.iter_mut().zip(&*trials) {
-        *strain = trial.values.map(f64::ln);
+        *strain = trial.values.map(ln_1p);
     }
     for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {
         let material = start(k).material;
@@ -95,6 +106,6 @@ pub(crate) fn states<'a, const D: usize>(
     }
     for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {
         state.kirchhoff_stress = trial.compose(stresses[k]);
-        state.elastic_left_cauchy_green = trial.compose(values[k]);
+        state.elastic_excess = trial.compose(values[k]);
     }
 }

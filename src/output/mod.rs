@@ -24,6 +24,7 @@ pub mod start;
 pub mod summary;
 pub mod tables;
 pub mod terminal;
+pub mod warnings;
 pub mod whole_file;
 
 #[cfg(test)]

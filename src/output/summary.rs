@@ -44,6 +44,8 @@ pub struct Summary {
     pub verify: BTreeMap<String, f64>,
     pub bodies: BTreeMap<String, BodySummary>,
     pub versions: BTreeMap<String, String>,
+    /// What the user should know of a run that went on, in the order of the first times.
+    pub warnings: Vec<String>,
 }
 
 /// Over the run, and in the worst step.
@@ -177,7 +179,7 @@ mod tests {
             keys(&value),
             "balance bodies cells_populated communication imbalance linear_iterations \
              newton_iterations peak_memory_bytes points ranks reason status steps_completed steps_requested title \
-             verify versions wall_seconds"
+             verify versions wall_seconds warnings"
         );
         assert_eq!(value["status"], "stopped");
         assert_eq!(value["newton_iterations"], serde_json::json!({"total": 8, "max": 5}));

@@ -142,8 +142,9 @@ point_fields! {
     acceleration: [f64; D], D;
     /// F at the end of the last finished step
     deformation_gradient: Matrix3<f64>, 9;
-    /// Elastic left Cauchy-Green strain b_e at the end of the last finished step
-    elastic_left_cauchy_green: Matrix3<f64>, 9;
+    /// b_e - 1, b_e the elastic left Cauchy-Green strain at the end of the last finished step: apart
+    /// from the unit, so that small strains keep their digits
+    elastic_excess: Matrix3<f64>, 9;
     /// Kirchhoff stress tau, Pa, at the end of the last finished step
     kirchhoff_stress: Matrix3<f64>, 9;
     /// Accumulated plastic strain: sum of the norms of the plastic log-strain increments
@@ -214,7 +215,7 @@ impl<const D: usize> Points<D> {
         self.velocity.push([0.0; D]);
         self.acceleration.push([0.0; D]);
         self.deformation_gradient.push(Matrix3::identity());
-        self.elastic_left_cauchy_green.push(Matrix3::identity());
+        self.elastic_excess.push(Matrix3::zeros());
         self.kirchhoff_stress.push(Matrix3::zeros());
         self.plastic_strain.push(0.0);
         self.dissipation.push(0.0);

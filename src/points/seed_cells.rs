@@ -1,7 +1,7 @@
 //! Points of bodies that fill the cells of a mesh, cell by cell.
 
 use crate::deck::Shape;
-use crate::deck::model::{Basis, Body, BodySource, Deck, Seeding};
+use crate::deck::model::{Basis, Body, BodySource, Deck, Place, Seeding};
 use crate::error::Result;
 use crate::grid::Mesh;
 use crate::grid::quadrature::SubCell;
@@ -9,8 +9,7 @@ use crate::grid::quadrature::SubCell;
 use super::share::Share;
 use super::{Points, rectangle_corners};
 
-/// Sub-cells or Gauss points of mesh cells. A mesh body has no outermost layer: its boundary is
-/// the mesh's own.
+/// Sub-cells or Gauss points of mesh cells.
 pub(crate) struct CellSeeding<'a, const D: usize> {
     mesh: &'a Mesh<D>,
     index: usize,
@@ -20,6 +19,8 @@ pub(crate) struct CellSeeding<'a, const D: usize> {
     shape: Option<&'a Shape>,
     cells: Vec<usize>,
     at_centroid: bool,
+    /// A boundary of the deck asks for the body's outermost points.
+    outermost: bool,
 }
 
 impl<'a, const D: usize> CellSeeding<'a, D> {
@@ -42,7 +43,33 @@ impl<'a, const D: usize> CellSeeding<'a, D> {
         // The position of a CPDI2 point is the centroid of its domain; others sit where their
         // sub-cell's centre maps to.
         let at_centroid = deck.method.basis == Basis::Cpdi2;
-        Ok(CellSeeding { mesh, index, body, seeding, shape, cells, at_centroid })
+        let asks = |place: &Place| matches!(place, Place::CellsOf { body } if *body == index);
+        let outermost = deck.boundaries.iter().any(|boundary| asks(&boundary.place));
+        Ok(CellSeeding { mesh, index, body, seeding, shape, cells, at_centroid, outermost })
+    }
+
+    /// Where a part of a cell has its point, if it has one.
+    fn place(&self, part: &SubCell<D>) -> Option<[f64; D]> {
+        let x = if self.at_centroid { part.centroid } else { part.position };
+        self.shape.is_none_or(|shape| shape.contains(&x)).then_some(x)
+    }
+
+    /// Whether the points of a cell are the body's outermost: the body does not fill it, or has
+    /// nothing behind one of its faces.
+    fn is_outermost(&self, cell: usize, parts: &[SubCell<D>]) -> bool {
+        if parts.iter().any(|part| self.place(part).is_none()) {
+            return true;
+        }
+        let mut neighbours = Vec::new();
+        self.mesh.face_neighbours(cell, &mut neighbours);
+        let mut parts = Vec::new();
+        neighbours.len() < self.mesh.element.faces().len()
+            || neighbours.iter().any(|&neighbour| {
+                parts.clear();
+                self.split(neighbour, &mut parts);
+                self.cells.binary_search(&neighbour).is_err()
+                    || parts.iter().all(|part| self.place(part).is_none())
+            })
     }
 
     /// Room for the candidates of a cell: no element makes more than six times n^D sub-cells.
@@ -79,17 +106,18 @@ impl<'a, const D: usize> CellSeeding<'a, D> {
         for candidate in candidates() {
             made.clear();
             self.split(self.cells[candidate], &mut made);
+            let outermost = self.outermost && self.is_outermost(self.cells[candidate], &made);
             for (sub, part) in made.iter().enumerate() {
-                let x = if self.at_centroid { part.centroid } else { part.position };
-                if self.shape.is_some_and(|shape| !shape.contains(&x)) {
-                    continue;
-                }
+                let Some(x) = self.place(part) else { continue };
                 let half = [0.5 * part.volume.powf(1.0 / D as f64); D];
                 let (id, density) =
                     (first_id + (candidate * per_cell + sub) as u64, self.body.density);
                 points.push_unstrained(id, self.index as u32, x, part.volume, density, half);
                 if let Some(corners) = points.corners.last_mut() {
                     *corners = part.corners;
+                }
+                if let Some(mark) = points.outermost.last_mut() {
+                    *mark = f64::from(u8::from(outermost));
                 }
             }
         }

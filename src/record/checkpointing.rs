@@ -143,15 +143,15 @@ pub fn find<const D: usize>(
         Restart::File(path) => vec![path.clone()],
         Restart::Last => listed(world, out)?,
     };
-    let mut refused = Vec::new();
+    let mut refused: Vec<(_, String)> = Vec::new();
     for path in &candidates {
         match checkpoint::read::<D>(path, physics, comm) {
             Ok(restored) => {
                 for (_, text) in &refused {
-                    log.say(&format!("warning: {text}"));
+                    log.warn(text);
                 }
                 if !refused.is_empty() {
-                    log.say(&format!("warning: falling back to {}", path.display()));
+                    log.warn(&format!("falling back to {}", path.display()));
                 }
                 return Ok(restored);
             }

@@ -44,8 +44,6 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
-    /// The last solve failed as its residual no longer fell.
-    pub stuck_at_round_off: bool,
     /// The last step with a row in the history.
     recorded: usize,
     /// Those of them before a restart.
@@ -161,7 +159,6 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
-            stuck_at_round_off: false,
             recorded: 0,
             earlier_steps: 0,
             reached: (0.0, 0.0),
@@ -249,7 +246,7 @@ impl Recorder {
     pub fn warn_of_files(&mut self, written: Result<()>) -> Result<()> {
         match written {
             Err(Error::File(text)) => {
-                self.log.say(&format!("warning: {text}"));
+                self.log.warn(&text);
                 Ok(())
             }
             other => other,
@@ -466,6 +463,7 @@ impl Recorder {
             verify,
             bodies: deck.bodies.iter().map(|body| body.name.clone()).zip(bodies).collect(),
             versions: self.versions.clone(),
+            warnings: self.log.warnings(),
         };
         let written = summary.write(&self.directory, world.comm());
         (summary, written)

@@ -23,9 +23,8 @@ impl Figures {
     fn insert(&mut self, name: String, value: f64, why: Option<String>) {
         if !value.is_finite() {
             let why = why.map_or_else(|| format!("it is {value}"), |why| format!("at {why}"));
-            self.warnings.push(format!(
-                "warning: verify \"{name}\" has no value ({why}): summary.json says null"
-            ));
+            self.warnings
+                .push(format!("verify \"{name}\" has no value ({why}): summary.json says null"));
         }
         self.values.insert(name, value);
     }

@@ -173,7 +173,7 @@ impl Run<'_> {
         }
         let plan = plan::of(world, &model, &points, &active);
         self.log.say(&report::plan(&plan));
-        warnings.iter().for_each(|warning| self.log.say(warning));
+        warnings.iter().for_each(|warning| self.log.warn(warning));
         drop(active);
         solver::rehearse(world, &model, plan.equations)?;
         if self.arguments.check {
@@ -238,6 +238,11 @@ impl Run<'_> {
             }
         };
         let figures = quasi_static::figures(world, &model, &points, &mut recorder)?;
+        let unused = self.session.unused_options()?;
+        if !unused.is_empty() {
+            let text = format!("PETSc options that nothing used: {}", unused.join(", "));
+            recorder.log.warn(&text);
+        }
         let (traffic, steps) = (clock.traffic(), recorder.steps_here());
         let sent = balance::communication(world, &model, traffic, steps);
         let (summary, written) =
@@ -253,12 +258,6 @@ impl Run<'_> {
             }
         };
         recorder.log.say(&report::closing(&summary, &recorder.directory()));
-        let unused = self.session.unused_options()?;
-        if !unused.is_empty() {
-            recorder
-                .log
-                .say(&format!("warning: PETSc options that nothing used: {}", unused.join(", ")));
-        }
         if ending.status == Status::Completed {
             return Ok(());
         }
@@ -272,9 +271,6 @@ impl Run<'_> {
                 _ if ending.on_request => Vec::new(),
                 3 => vec![checkpointing::advice(world, &recorder.directory())],
                 _ if !of_numerics => Vec::new(),
-                _ if recorder.stuck_at_round_off => {
-                    vec!["raise analysis.tolerance: the residual no longer falls".into()]
-                }
                 _ => advice(&model.deck),
             },
             ..Failure::default()

@@ -63,6 +63,7 @@ impl Conditions {
                     held[*component] = Some(increment_of(expression, &start, span));
                 }
                 if let Some(rotation) = &boundary.rotation {
+                    // About z: the third component is the other keys'.
                     let turn = rotated(rotation, &grid.node_position(node), span);
                     for (slot, value) in held.iter_mut().zip(turn) {
                         *slot = Some(value);
@@ -188,13 +189,10 @@ fn increment_of<const D: usize>(expression: &Expression, start: &[f64; D], span:
     }
 }
 
-/// Displacement of `x` under the step's share of a rigid rotation about z.
-fn rotated<const D: usize>(rotation: &Rotation, x: &[f64; D], span: StepSpan) -> [f64; D] {
+/// Displacement in x and y under the step's share of a rigid rotation about z.
+fn rotated<const D: usize>(rotation: &Rotation, x: &[f64; D], span: StepSpan) -> [f64; 2] {
     let angle = rotation.degrees.to_radians() * (span.factor_end - span.factor_start);
     let (sin, cos) = angle.sin_cos();
     let arm = [x[0] - rotation.centre[0], x[1] - rotation.centre[1]];
-    let mut moved = [0.0; D];
-    moved[0] = (cos - 1.0) * arm[0] - sin * arm[1];
-    moved[1] = sin * arm[0] + (cos - 1.0) * arm[1];
-    moved
+    [(cos - 1.0) * arm[0] - sin * arm[1], sin * arm[0] + (cos - 1.0) * arm[1]]
 }

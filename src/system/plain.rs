@@ -7,7 +7,7 @@ use crate::deck::model::Frame;
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 use super::scatter::BlockMatrix;
-use super::terms::stress::{Health, StepPoints, deformation_increment, respond};
+use super::terms::stress::{Health, StepPoints, displacement_gradient, respond};
 
 /// As [`crate::system::terms::stress::assemble`], to rounding.
 pub fn assemble<const D: usize>(
@@ -25,7 +25,7 @@ pub fn assemble<const D: usize>(
         let range = step.groups.node_offsets[group]..step.groups.node_offsets[group + 1];
         let nodes = &step.group_nodes[range];
         let gradients = &step.influences.gradients[step.influences.row(p)];
-        let increment = deformation_increment(gradients, |a| {
+        let increment = displacement_gradient(gradients, |a| {
             std::array::from_fn(|i| displacement[nodes[a] as usize * D + i])
         });
         let Some(made) = respond(step, frame, p, &increment, &mut health) else { continue };

@@ -12,6 +12,16 @@ pub fn identity<const D: usize>() -> Square<D> {
     std::array::from_fn(|i| std::array::from_fn(|j| if i == j { 1.0 } else { 0.0 }))
 }
 
+/// 1 + a
+#[inline]
+pub fn plus_unit<const D: usize>(a: &Square<D>) -> Square<D> {
+    let mut sum = *a;
+    for (i, row) in sum.iter_mut().enumerate() {
+        row[i] += 1.0;
+    }
+    sum
+}
+
 /// a b
 #[inline]
 pub fn multiply<const D: usize>(a: &Square<D>, b: &Square<D>) -> Square<D> {

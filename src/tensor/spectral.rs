@@ -122,17 +122,26 @@ pub fn square_root(a: &Matrix3<f64>) -> Matrix3<f64> {
     spectrum.compose(spectrum.values.map(f64::sqrt))
 }
 
-/// (ln a - ln b) / (a - b) for positive a, b with their logarithms known; 1/a where a = b.
+/// ln(1 + x) with all digits also where x is small: what the sum loses of x comes back to first
+/// order.
+#[inline(always)]
+pub fn ln_1p(x: f64) -> f64 {
+    let sum = 1.0 + x;
+    sum.ln() + (x - (sum - 1.0)) / sum
+}
+
+/// (ln(1 + a) - ln(1 + b)) / (a - b) for a, b > -1 with the logarithms known; 1/(1 + a) where a = b.
 #[inline]
 pub fn logarithm_slope(a: f64, b: f64, ln_a: f64, ln_b: f64) -> f64 {
-    let z = (a - b) / (a + b);
+    let sum = 2.0 + a + b;
+    let z = (a - b) / sum;
     if z.abs() < 0.05 {
         // ln(a/b) = 2 artanh z; the first term left out is below 2e-17.
         let q = z * z;
         let series = 1.0
             + q * (1.0 / 3.0
                 + q * (1.0 / 5.0 + q * (1.0 / 7.0 + q * (1.0 / 9.0 + q * (1.0 / 11.0)))));
-        2.0 * series / (a + b)
+        2.0 * series / sum
     } else {
         (ln_a - ln_b) / (a - b)
     }
@@ -268,7 +277,7 @@ mod tests {
 
     #[test]
     fn slope_of_the_logarithm_is_smooth() {
-        let slope = |a: f64, b: f64| logarithm_slope(a, b, a.ln(), b.ln());
+        let slope = |a: f64, b: f64| logarithm_slope(a - 1.0, b - 1.0, a.ln(), b.ln());
         assert_eq!(slope(2.5, 2.5), 1.0 / 2.5);
         for x in [1e-15_f64, 1e-10, 1e-4, 0.01, 0.09, 0.104, 0.106, 0.2, 3.0, -0.09, -0.11, -0.5] {
             let a = 1.7 * (1.0 + x);

@@ -40,7 +40,7 @@ pub fn add_momentum<const D: usize>(
 }
 
 /// Σ_p S^T f - ∇S^T σ V (Ghost eq. 6), N, with σ V = τ V0. `external` is the force on each
-/// point, empty for none. `increments` holds dF since the gradients were computed, empty for
+/// point, empty for none. `increments` holds dF - 1 since the gradients were computed, empty for
 /// none: the gradients are then those of the deformed state, ∇S dF^-1.
 pub fn force<const D: usize>(
     step: StepPoints<'_, D>,
@@ -68,7 +68,7 @@ pub fn add_force<const D: usize>(
         // Row i of τ V0 dF^-T: what the gradient is multiplied with.
         let mut flux = stress.map(|row| row.map(|s| s * volume));
         if let Some(increment) = increments.get(p) {
-            let (inverse, _) = dense::inverse(increment);
+            let (inverse, _) = dense::inverse(&dense::plus_unit(increment));
             flux = dense::multiply_transposed(&flux, &inverse);
         }
         let own = external.get(p).copied().unwrap_or([0.0; D]);
@@ -177,14 +177,14 @@ pub fn at_points<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<
         .collect()
 }
 
-/// dF = 1 + Σ_v u ∇S at each point (Lagrangian eq. 7).
-pub fn deformation_increments<const D: usize>(
+/// dF - 1 = Σ_v u ∇S at each point (Lagrangian eq. 7).
+pub fn displacement_gradients<const D: usize>(
     step: StepPoints<'_, D>,
     displacement: &[f64],
 ) -> Vec<Square<D>> {
     (0..step.points.len())
         .map(|p| {
-            let mut increment = dense::identity();
+            let mut increment = [[0.0; D]; D];
             let gradients = &step.influences.gradients[step.influences.row(p)];
             for (&node, gradient) in step.nodes_of(p).iter().zip(gradients) {
                 let u = &displacement[node as usize * D..node as usize * D + D];

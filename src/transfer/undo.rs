@@ -15,7 +15,7 @@ pub struct Snapshot<const D: usize> {
     pub velocity: Former<[f64; D]>,
     pub acceleration: Former<[f64; D]>,
     pub deformation_gradient: Former<Matrix3<f64>>,
-    pub elastic_left_cauchy_green: Former<Matrix3<f64>>,
+    pub elastic_excess: Former<Matrix3<f64>>,
     pub kirchhoff_stress: Former<Matrix3<f64>>,
     pub plastic_strain: Former<f64>,
     pub dissipation: Former<f64>,
@@ -30,7 +30,7 @@ impl<const D: usize> Snapshot<D> {
         self.velocity.wanted = false;
         self.acceleration.wanted = false;
         self.deformation_gradient.wanted = false;
-        self.elastic_left_cauchy_green.wanted = false;
+        self.elastic_excess.wanted = false;
         self.kirchhoff_stress.wanted = false;
         self.plastic_strain.wanted = false;
         self.dissipation.wanted = false;
@@ -44,7 +44,7 @@ impl<const D: usize> Snapshot<D> {
         self.velocity.give_back(&mut points.velocity);
         self.acceleration.give_back(&mut points.acceleration);
         self.deformation_gradient.give_back(&mut points.deformation_gradient);
-        self.elastic_left_cauchy_green.give_back(&mut points.elastic_left_cauchy_green);
+        self.elastic_excess.give_back(&mut points.elastic_excess);
         self.kirchhoff_stress.give_back(&mut points.kirchhoff_stress);
         self.plastic_strain.give_back(&mut points.plastic_strain);
         self.dissipation.give_back(&mut points.dissipation);

@@ -15,14 +15,15 @@ use crate::mechanics::{self, BATCH, StepStart, StressState};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::numbering::Numbering;
-use crate::system::terms::stress::{StepPoints, deformation_increment};
-use crate::tensor::{self, Spectrum};
+use crate::system::terms::stress::{StepPoints, displacement_gradient};
+use crate::tensor::spectral::ln_1p;
+use crate::tensor::{Spectrum, dense};
 
 use super::undo::{Former, Snapshot};
 
 /// Increments at each point of this rank, computed but not yet applied.
 pub struct Increments<const D: usize> {
-    /// dF
+    /// dF - 1
     pub deformation: Vec<[[f64; D]; D]>,
     /// m
     pub displacement: Vec<[f64; D]>,
@@ -55,7 +56,7 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
             std::array::from_fn(|i| displacement[start + i])
         };
         made.deformation
-            .push(deformation_increment(&step.influences.gradients[row.clone()], nodal));
+            .push(displacement_gradient(&step.influences.gradients[row.clone()], nodal));
         let mut moved = [0.0; D];
         for (a, weight) in step.influences.weights[row].iter().enumerate() {
             for (m, u) in moved.iter_mut().zip(nodal(a)) {
@@ -99,7 +100,7 @@ pub fn reason_to_refuse<const D: usize>(
     })
 }
 
-/// [`reason_to_refuse`] of dF alone. Collective.
+/// [`reason_to_refuse`] of dF - 1 alone. Collective.
 pub fn deformation_to_refuse<const D: usize>(
     world: &World,
     points: &Points<D>,
@@ -118,7 +119,7 @@ enum Fault {
 }
 
 fn fault_of<const D: usize>(increment: &[[f64; D]; D]) -> Option<Fault> {
-    let determinant = tensor::dense::determinant(increment);
+    let determinant = dense::determinant(&dense::plus_unit(increment));
     if !determinant.is_finite() {
         return Some(Fault::NotFinite);
     }
@@ -182,8 +183,9 @@ pub fn unsound_domain<const D: usize>(
             increments.corners.push(cpdi2::moved_corners(grids, points, p, &mut hint, &nodal)?);
             return Ok(());
         }
-        let (increment, moved) = (&increments.deformation[p], &increments.displacement[p]);
-        cpdi1::check_step(after, points, p, increment, moved, &mut hint)
+        let increment = dense::plus_unit(&increments.deformation[p]);
+        let moved = &increments.displacement[p];
+        cpdi1::check_step(after, points, p, &increment, moved, &mut hint)
     };
     let reason = (0..points.len()).find_map(|p| check(p).err());
     world.first_message(reason.map(|error| error.to_string()))
@@ -222,7 +224,7 @@ pub fn apply<const D: usize>(
     Ok(())
 }
 
-/// F, b_e, stress and history for the increments dF (Lagrangian eq. 16); returns the energies
+/// F, b_e, stress and history for the increments dF - 1 (Lagrangian eq. 16); returns the energies
 /// of the new state, all but the kinetic one.
 pub fn deform<const D: usize>(
     materials: &[Material],
@@ -234,7 +236,7 @@ pub fn deform<const D: usize>(
     respond(materials, increments, points, before)
 }
 
-/// F of the increments dF alone: what [`follow`] reads.
+/// F of the increments dF - 1 alone: what [`follow`] reads.
 pub fn stretch<const D: usize>(
     increments: &[[[f64; D]; D]],
     points: &mut Points<D>,
@@ -245,7 +247,8 @@ pub fn stretch<const D: usize>(
         let mut gradient = *old;
         for j in 0..3 {
             for i in 0..D {
-                gradient[(i, j)] = (0..D).map(|k| increment[i][k] * old[(k, j)]).sum();
+                gradient[(i, j)] =
+                    old[(i, j)] + (0..D).map(|k| increment[i][k] * old[(k, j)]).sum::<f64>();
             }
         }
         gradient
@@ -280,7 +283,7 @@ fn overwrite<T: Copy, W>(
     }
 }
 
-/// b_e, stress and history of the increments dF; energies as [`deform`] returns them.
+/// b_e, stress and history of the increments dF - 1; energies as [`deform`] returns them.
 pub fn respond<const D: usize>(
     materials: &[Material],
     increments: &[[[f64; D]; D]],
@@ -288,7 +291,7 @@ pub fn respond<const D: usize>(
     mut before: Option<&mut Snapshot<D>>,
 ) -> PointEnergies {
     if let Some(before) = &mut before {
-        before.elastic_left_cauchy_green.set_aside(&mut points.elastic_left_cauchy_green);
+        before.elastic_excess.set_aside(&mut points.elastic_excess);
         before.kirchhoff_stress.set_aside(&mut points.kirchhoff_stress);
         before.plastic_strain.set_aside(&mut points.plastic_strain);
         before.dissipation.set_aside(&mut points.dissipation);
@@ -299,13 +302,13 @@ pub fn respond<const D: usize>(
     for (batch, increments) in increments.chunks(BATCH).enumerate() {
         let first = batch * BATCH;
         let elastic = match before {
-            Some(before) => before.elastic_left_cauchy_green.values(),
-            None => &points.elastic_left_cauchy_green,
+            Some(before) => before.elastic_excess.values(),
+            None => &points.elastic_excess,
         };
         let start = |k: usize| StepStart {
             material: &materials[points.body[first + k] as usize],
             deformation_gradient: &points.deformation_gradient[first + k],
-            elastic_left_cauchy_green: &elastic[first + k],
+            elastic_excess: &elastic[first + k],
             volume_initial: points.volume_initial[first + k],
         };
         mechanics::stresses(start, increments, &mut states);
@@ -314,7 +317,7 @@ pub fn respond<const D: usize>(
                 Some(before) => (before.plastic_strain.values()[p], before.dissipation.values()[p]),
                 None => (points.plastic_strain[p], points.dissipation[p]),
             };
-            points.elastic_left_cauchy_green[p] = state.elastic_left_cauchy_green;
+            points.elastic_excess[p] = state.elastic_excess;
             points.kirchhoff_stress[p] = state.kirchhoff_stress;
             points.plastic_strain[p] = strain + state.plastic_increment;
             points.dissipation[p] = lost + state.dissipation;
@@ -368,9 +371,9 @@ pub fn move_points<const D: usize>(
     });
 }
 
-/// dF of plane strain has dF_zz = 1.
+/// dF of dF - 1; that of plane strain has dF_zz = 1.
 fn embed<const D: usize>(increment: &[[f64; D]; D]) -> Matrix3<f64> {
-    tensor::dense::embed(increment, 1.0)
+    dense::embed(&dense::plus_unit(increment), 1.0)
 }
 
 /// Energies of this rank's points at their present state.
@@ -378,8 +381,7 @@ pub fn energies<const D: usize>(points: &Points<D>, materials: &[Material]) -> P
     let mut sum = PointEnergies::default();
     for p in 0..points.len() {
         let elasticity = materials[points.body[p] as usize].elasticity();
-        let strain =
-            Spectrum::of(&points.elastic_left_cauchy_green[p]).values.map(|b| 0.5 * b.ln());
+        let strain = Spectrum::of(&points.elastic_excess[p]).values.map(|e| 0.5 * ln_1p(e));
         sum.strain += elasticity.energy(strain) * points.volume_initial[p];
         sum.plastic += points.dissipation[p] * points.volume_initial[p];
         let speed: f64 = points.velocity[p].iter().map(|v| v * v).sum();

@@ -25,7 +25,7 @@ use mpm_par::system::conditions::{Conditions, StepSpan};
 use mpm_par::system::numbering::Numbering;
 use mpm_par::system::scatter::BlockMatrix;
 use mpm_par::system::step_system::{Discretisation, Model};
-use mpm_par::system::terms::stress::{self, deformation_increment};
+use mpm_par::system::terms::stress::{self, displacement_gradient};
 use mpm_par::transfer::update;
 use mpm_par::{basis, deck};
 use report::{Sample, machine, resident_bytes, sample, sample_parts};
@@ -299,7 +299,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         .map(|p| {
             let row = mesh.influences.row(p);
             let nodes = &mesh.influences.nodes[row.clone()];
-            deformation_increment(&mesh.influences.gradients[row.clone()], |a| {
+            displacement_gradient(&mesh.influences.gradients[row.clone()], |a| {
                 let local = numbering.local(nodes[a]).expect("active");
                 std::array::from_fn(|i| displacement[local * D + i])
             })
@@ -311,7 +311,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
             let start = StepStart {
                 material: &model.materials[points.body[p] as usize],
                 deformation_gradient: &points.deformation_gradient[p],
-                elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
+                elastic_excess: &points.elastic_excess[p],
                 volume_initial: points.volume_initial[p],
             };
             let (made, state) = mechanics::contribution::<D>(frame, &start, &increments[p]);

@@ -137,7 +137,8 @@ pub const SECTIONS: &[Section] = &[
             key("where", Table("where"), Required, "Which nodes."),
             key("fix", Choices(&AXES), Optional("none"), "Components held at zero."),
             key("displacement", Table("displacement"), Optional("none"), "Prescribed components."),
-            key("rotation", Table("rotation"), Optional("none"), "Rigid rotation (x and y)."),
+            key("rotation", Table("rotation"), Optional("none"),
+                "Rigid rotation: prescribes x and y. In 3D z is free unless fix or displacement prescribe it."),
         ],
     },
     Section {
@@ -150,7 +151,7 @@ pub const SECTIONS: &[Section] = &[
                 "Nodes in or on a box (tolerance 1e-9 of a cell), in start positions; at least one of the grid."),
             key("tag", Text, Optional("-"), "Nodes of a tag of the mesh."),
             key("cells_of", Text, Optional("-"),
-                "Nodes of the cells that hold the outermost points of a body, found anew in each step (Lagrangian §7.2)."),
+                "Nodes of the cells that hold the outermost points of a body, found anew in each step (Lagrangian §7.2). On a mesh these are the points seeded in cells that the body does not fill, or behind one face of which it has nothing. Not for a body of a file."),
         ],
     },
     Section {

@@ -154,7 +154,7 @@ impl PointField {
             PointField::Stress => append_symmetric(&cauchy(), out),
             PointField::KirchhoffStress => append_symmetric(&points.kirchhoff_stress[p], out),
             PointField::ElasticLeftCauchyGreen => {
-                append_symmetric(&points.elastic_left_cauchy_green[p], out);
+                append_symmetric(&(Matrix3::identity() + points.elastic_excess[p]), out);
             }
             PointField::Pressure => out.push(-cauchy().trace() / 3.0),
             PointField::VonMises => out.push(1.5_f64.sqrt() * deviatoric_norm(&cauchy())),

@@ -8,6 +8,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 use crate::error::Result;
 use crate::output::agreement::on_root;
 use crate::output::directory::{LOG, ResultsDirectory};
+use crate::output::warnings::Warnings;
 use crate::output::whole_file::cannot_write;
 
 /// Erases the line that the next text replaces.
@@ -23,6 +24,7 @@ pub struct Log {
     transient: bool,
     unwritten: String,
     file: Option<File>,
+    warnings: Warnings,
 }
 
 impl Log {
@@ -34,6 +36,7 @@ impl Log {
             transient: false,
             unwritten: String::new(),
             file: None,
+            warnings: Warnings::default(),
         }
     }
 
@@ -45,6 +48,7 @@ impl Log {
             transient: false,
             unwritten: String::new(),
             file: None,
+            warnings: Warnings::default(),
         }
     }
 
@@ -77,6 +81,29 @@ impl Log {
     pub fn say(&mut self, text: &str) {
         self.show(text);
         self.note(text);
+    }
+
+    /// Warns of `text`, unless it has done so before, and keeps it for the summary.
+    pub fn warn(&mut self, text: &str) {
+        if self.warnings.add(None, text) {
+            self.say(&format!("warning: {text}"));
+        }
+    }
+
+    /// [`Self::warn`] of what `step` met; `text` tells what may come back in later steps, which then
+    /// only the file and the count show. `detail` belongs to this step.
+    pub fn warn_of_step(&mut self, step: usize, text: &str, detail: &str) {
+        let whole = format!("warning: step {step}: {text} {detail}");
+        if self.warnings.add(Some(step), text) {
+            self.say(whole.trim_end());
+        } else {
+            self.note(whole.trim_end());
+        }
+    }
+
+    /// What the run has warned of.
+    pub fn warnings(&self) -> Vec<String> {
+        self.warnings.lines()
     }
 
     /// Says `text` on the terminal only.

@@ -153,6 +153,9 @@ pub fn closing(summary: &Summary, results: &std::path::Path) -> String {
     for (name, value) in &summary.verify {
         row("verify", format!("{name} = {value:.6e}"));
     }
+    for warning in &summary.warnings {
+        row("warning", warning.clone());
+    }
     row("results", results.display().to_string());
     // The row without a name is the empty line between the tables.
     text.lines().map(|line| format!("{}\n", line.trim_end())).collect()

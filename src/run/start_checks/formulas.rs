@@ -135,6 +135,20 @@ fn boundaries<const D: usize>(
             let key = format!("boundary.{index}.where.box");
             return Err(Error::Input(deck.places.say(&key, &why)));
         }
+        if let Place::CellsOf { body } = boundary.place
+            && !world.any(
+                (0..points.len())
+                    .any(|p| points.body[p] as usize == body && points.outermost[p] != 0.0),
+            )
+        {
+            let why = format!(
+                "body \"{}\" has no outermost points that could be followed: expected one that the \
+                 deck seeds in its shape; the points of a file do not tell which are outermost",
+                deck.bodies[body].name
+            );
+            let key = format!("boundary.{index}.where.cells_of");
+            return Err(Error::Input(deck.places.say(&key, &why)));
+        }
         let alone = std::slice::from_ref(boundary);
         let basis = deck.method.basis;
         let found = Conditions::evaluate(world, grid, basis, numbering, points, alone, span);
@@ -146,7 +160,7 @@ fn boundaries<const D: usize>(
         })?;
         if world.sum_usize(found.members[0].len()) == 0 {
             warnings.push(format!(
-                "warning: boundary \"{}\" acts on nothing at the start: no node of it touches a \
+                "boundary \"{}\" acts on nothing at the start: no node of it touches a \
                  cell that holds material",
                 boundary.name
             ));

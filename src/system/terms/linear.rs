@@ -71,7 +71,20 @@ impl GhostTerm {
     }
 }
 
+impl GhostTerm {
+    /// size += |K_G| |u| over the owned nodes, N: what [`crate::analysis::round_off`] asks for.
+    pub fn add_size(&self, pattern: &Pattern, moved: &[f64], size: &mut [f64]) {
+        add_size(&self.matrix, pattern, moved, size);
+    }
+}
+
 impl Inertia {
+    /// size = share size + |matrix| |u| over the owned nodes, N.
+    pub fn add_size(&self, pattern: &Pattern, moved: &[f64], size: &mut [f64]) {
+        size.iter_mut().for_each(|value| *value *= self.share);
+        add_size(&self.matrix, pattern, moved, size);
+    }
+
     /// force = share force + matrix u over the owned rows.
     pub fn add_force<const D: usize>(
         &self,
@@ -98,6 +111,16 @@ impl Inertia {
             values.iter_mut().for_each(|value| *value *= self.share);
             scatter::add_scalar_row(&self.matrix, pattern, row, rows);
         }
+    }
+}
+
+/// size += |J| |u| with the norms `moved` of local nodes.
+fn add_size(scalar: &BlockMatrix<1>, pattern: &Pattern, moved: &[f64], size: &mut [f64]) {
+    for (row, size) in size.iter_mut().enumerate() {
+        let entries = pattern.offsets[row]..pattern.offsets[row + 1];
+        *size += entries
+            .map(|entry| scalar.values[entry].abs() * moved[pattern.columns[entry] as usize])
+            .sum::<f64>();
     }
 }
 

@@ -8,6 +8,7 @@ use crate::deck::model::{Frame, PointVolume};
 use crate::material::Material;
 use crate::mechanics::{self, Contribution, StepStart};
 use crate::points::Points;
+use crate::tensor::dense;
 use crate::tensor::fused::{self, multiply_add};
 
 use crate::system::border::Border;
@@ -229,7 +230,7 @@ impl<const D: usize> Task<'_, D> {
     ) {
         let step = self.step;
         let gradients = &step.influences.gradients[step.influences.row(p)];
-        let increment = deformation_increment(gradients, |a| work.displacement[a]);
+        let increment = displacement_gradient(gradients, |a| work.displacement[a]);
         let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
         let map = &contribution.gradient_map;
         let stress = contribution.stress.map(|row| row.map(|s| s * contribution.volume));
@@ -267,14 +268,14 @@ pub(crate) fn respond<const D: usize>(
     let start = StepStart {
         material: &step.materials[points.body[p] as usize],
         deformation_gradient: &points.deformation_gradient[p],
-        elastic_left_cauchy_green: &points.elastic_left_cauchy_green[p],
+        elastic_excess: &points.elastic_excess[p],
         volume_initial: match step.volume {
             PointVolume::Deformation => points.volume_initial[p],
             PointVolume::Domain => domain_volume(points, p),
         },
     };
     let (contribution, state) = mechanics::contribution(frame, &start, increment);
-    if crate::tensor::dense::determinant(increment) <= 0.0 {
+    if dense::determinant(&dense::plus_unit(increment)) <= 0.0 {
         health.inverted.get_or_insert(p);
     }
     if !state.kirchhoff_stress.iter().all(|t| t.is_finite()) {
@@ -292,16 +293,14 @@ fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
     points.volume_initial[p] * ratio / points.deformation_gradient[p].determinant()
 }
 
-/// dF = 1 + Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7).
+/// dF - 1 = Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7): without the unit, in which small gradients
+/// would lose their digits.
 #[inline]
-pub fn deformation_increment<const D: usize>(
+pub fn displacement_gradient<const D: usize>(
     gradients: &[[f64; D]],
     displacement: impl Fn(usize) -> [f64; D],
 ) -> [[f64; D]; D] {
     let mut increment = [[0.0; D]; D];
-    for (i, row) in increment.iter_mut().enumerate() {
-        row[i] = 1.0;
-    }
     for (a, gradient) in gradients.iter().enumerate() {
         let u = displacement(a);
         for i in 0..D {
