@@ -64,7 +64,7 @@ def launched(ranks, h, ghost, out, more, patience):
     """Starts the program; its processor seconds, those of mpirun among them, or None."""
     words = [PROGRAM, os.path.join(ROOT, "inputs/scaling.toml"), "--out", out, "--force"]
     words += [word for word in more if word == "--check"]
-    for setting in [f"grid.h={h!r}"] + ([] if ghost else ["ghost="]) + more:
+    for setting in [f"grid.h={h!r}"] + ([] if ghost else ["ghost=off"]) + more:
         words += ["--set", setting] if setting != "--check" else []
     words += ["-log_view", ":" + out + ".log_view"]
     script = '. "$ROOT/jobs/machines/$MACHINE.sh"; launch "$@"'

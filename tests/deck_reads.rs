@@ -61,9 +61,43 @@ fn dynamics_meshes_and_three_dimensions_become_decks() {
     assert_eq!(deck.boundaries[2].place, Place::Side { axis: 2, upper: false });
 }
 
+/// (stiffness factor, mass factor) in force; the resolved deck reads back to the deck.
+fn ghost_factors(text: &str, sets: &[&str]) -> Option<(Option<f64>, Option<f64>)> {
+    let deck = read(text, sets);
+    let again = read(&deck::resolved(&deck), &[]);
+    assert_eq!((&again.ghost, &again.method), (&deck.ghost, &deck.method), "{sets:?}");
+    deck.ghost.map(|ghost| (ghost.stiffness_factor, ghost.mass_factor))
+}
+
+#[test]
+fn ghost_is_on_unless_it_is_turned_off() {
+    let (stiffness, mass) = (Some(0.01), Some(0.25));
+    for (text, sets, expected) in [
+        (BEAM, &["ghost="][..], Some((stiffness, None))),
+        (BEAM, &["ghost.stiffness="], Some((stiffness, None))),
+        (BEAM, &["ghost=off"], None),
+        (BEAM, &["ghost=\"off\""], None),
+        // A table with one of the two says all.
+        (BEAM, &["ghost=off", "ghost.mass_factor=0.5"], Some((None, Some(0.5)))),
+        (CUBE, &[], Some((stiffness, mass))),
+        (CUBE, &["method.mass=lumped"], Some((stiffness, None))),
+        (DYNAMIC, &["ghost="], Some((None, mass))),
+        (DYNAMIC, &["ghost=", "method.mass=lumped"], None),
+        (ANNULUS, &[], Some((stiffness, None))),
+        (ANNULUS, &["method.control=fem", "grid.motion="], None),
+    ] {
+        assert_eq!(ghost_factors(text, sets), expected, "{sets:?}");
+    }
+    assert_eq!(read(BEAM, &["ghost="]).method.drop_below, 0.0);
+    assert_eq!(
+        read(BEAM, &["ghost=", "ghost.scaling=literal"]).ghost.unwrap().scaling,
+        GhostScaling::Literal
+    );
+}
+
 #[test]
 fn options_change_the_deck() {
-    let deck = read(BEAM, &["method.basis=mpm", "body.0.points_per_cell=[3, 4]", "ghost="]);
+    let deck = read(BEAM, &["method.basis=mpm", "body.0.points_per_cell=[3, 4]", "ghost=off"]);
     assert_eq!(deck.method.basis, Basis::Mpm);
     assert!(matches!(
         &deck.bodies[0].source,

@@ -8,7 +8,7 @@ use common::run::Run;
 
 /// A soft block on smooth ground under its own weight, without Ghost stiffness.
 fn block() -> Run {
-    Run::text(include_str!("decks/block.toml")).set("ghost=")
+    Run::text(include_str!("decks/block.toml")).set("ghost=off")
 }
 
 fn with(words: &str) -> Run {
@@ -44,7 +44,7 @@ const SINGULAR: &str =
     "error: step 1 of 2 could not be solved: Newton's method failed (the linear \
 solver ended with DIVERGED_PC_FAILED (zero pivot: the matrix is singular) after 0 iterations); the \
 last finished step is 0
-    try: stabilise small overlaps: [ghost] stiffness_factor = 1.0
+    try: stabilise small overlaps: leave out ghost = \"off\"
     try: let steps be cut: analysis.on_failure = \"cut\"
     try: more, smaller steps: analysis.steps
 results: out, good up to step 0";

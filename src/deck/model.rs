@@ -19,6 +19,7 @@ pub struct Deck {
     pub directory: PathBuf,
     pub analysis: Analysis,
     pub method: Method,
+    /// What is in force; `None`: nothing is stabilised.
     pub ghost: Option<Ghost>,
     pub grid: Grid,
     pub materials: Vec<Material>,
@@ -175,6 +176,13 @@ pub struct Ghost {
     /// gamma_M as a multiple of each body's density.
     pub mass_factor: Option<f64>,
     pub scaling: GhostScaling,
+}
+
+impl Ghost {
+    /// gamma_K over Young's modulus where the deck says nothing: docs/evidence/ghost-factors.md.
+    pub const STIFFNESS_FACTOR: f64 = 0.01;
+    /// gamma_M over the density where the deck says nothing (Ghost §5.1).
+    pub const MASS_FACTOR: f64 = 0.25;
 }
 
 /// Scale of the face matrix: numerics of the default and of the papers' tables differ.

@@ -26,7 +26,7 @@ const OPTIONS: &str = "\
 `--set KEY=VALUE` changes any key by its dotted path, arrays by index, as in
 `--set method.basis=mpm`, `--set body.0.points_per_cell=[3,3]` or
 `--set grid.generate.annulus.inner=3`. The value is TOML; a word that is not TOML is a string.
-Missing tables on the way are made. `--set ghost=` (no value) removes a key.
+Missing tables on the way are made. `--set petsc=` (no value) removes a key.
 ";
 
 /// The reference of all sections and keys, in Markdown.

@@ -11,6 +11,10 @@ use super::shape::{Form, Shape};
 pub fn resolved(deck: &Deck) -> String {
     let mut w = Writer::default();
     w.line("", "title", quote(&deck.title));
+    // A key of the top level stands before the first table.
+    if deck.ghost.is_none() {
+        w.line("", "ghost", quote("off"));
+    }
     analysis(&mut w, deck);
     grid(&mut w, deck);
     materials_and_bodies(&mut w, deck);

@@ -159,7 +159,8 @@ pub fn apply_set(root: &mut Node, option: &str, index: usize) -> Result<(), Stri
     change(root, &keys, "", Some(value), &origin)
 }
 
-/// Replaces (or removes) the value at `keys` below `node`, which is called `name` in messages.
+/// Replaces (or removes) the value at `keys` below `node`, which is called `name` in messages. A
+/// word on the way, such as `ghost = "off"`, gives way to a table.
 fn change(
     node: &mut Node,
     keys: &[&str],
@@ -169,6 +170,9 @@ fn change(
 ) -> Result<(), String> {
     let (key, rest) = keys.split_first().expect("the path has at least one key");
     let full = if name.is_empty() { (*key).to_string() } else { format!("{name}.{key}") };
+    if matches!(node.value, Value::String(_)) && value.is_some() {
+        node.value = Value::Table(Vec::new());
+    }
     match &mut node.value {
         Value::Table(entries) => {
             let found = entries.iter().position(|entry| entry.key == *key);
@@ -269,6 +273,7 @@ mod tests {
             ("a=\"x=1\"", "{a=\"x=1\",body=[{n=[1,2]},{}]}"),
             ("a=", "{body=[{n=[1,2]},{}]}"),
             ("body.1=", "{a=1,body=[{n=[1,2]}]}"),
+            ("body.0.n=off", "{a=1,body=[{n=\"off\"},{}]}"),
             ("nothing.here=", "{a=1,body=[{n=[1,2]},{}]}"),
         ] {
             assert_eq!(after(text, &[option]).as_deref(), Ok(expected), "{option}");

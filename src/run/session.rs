@@ -8,7 +8,7 @@ use mpi::environment::Universe;
 use mpi::traits::*;
 
 use crate::cli::{self, Arguments};
-use crate::deck::model::AnalysisType;
+use crate::deck::model::{AnalysisType, Ghost};
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
 use crate::output::directory::ResultsDirectory;
@@ -285,8 +285,13 @@ fn advice(deck: &Deck) -> Vec<String> {
     if matches!(deck.analysis.kind, AnalysisType::Explicit | AnalysisType::Conditioning) {
         return vec!["smaller steps: analysis.steps, or analysis.cfl = 0.5 in its place".into()];
     }
-    if deck.ghost.as_ref().is_none_or(|g| g.stiffness.is_none() && g.stiffness_factor.is_none()) {
-        advice.push("stabilise small overlaps: [ghost] stiffness_factor = 1.0".to_string());
+    match &deck.ghost {
+        None => advice.push("stabilise small overlaps: leave out ghost = \"off\"".to_string()),
+        Some(ghost) if ghost.stiffness.is_none() && ghost.stiffness_factor.is_none() => {
+            let factor = Ghost::STIFFNESS_FACTOR;
+            advice.push(format!("stabilise small overlaps: ghost.stiffness_factor = {factor}"));
+        }
+        Some(_) => {}
     }
     if deck.analysis.on_failure == crate::deck::model::OnFailure::Stop {
         advice.push("let steps be cut: analysis.on_failure = \"cut\"".to_string());

@@ -136,8 +136,8 @@ impl Case {
         let cells = ((2.0 + 2.0 * pad) / h).round() as usize;
         let origin = list(&|i| format!("{:?}", -1.0 - pad + self.offset[i] * h));
         let ghost = match self.scaling {
-            "off" => String::new(),
-            name => format!("[ghost]\nstiffness_factor = 1.0\nscaling = \"{name}\"\n"),
+            "off" => "ghost = \"off\"\n".to_string(),
+            name => format!("ghost = {{ stiffness_factor = 1.0, scaling = \"{name}\" }}\n"),
         };
         let cap = list(&|i| if i + 1 == d { "-0.7".into() } else { "3.0".to_string() });
         let verify: String = [("stress_mean", "volume-l2"), ("stress_largest", "max")]
@@ -149,8 +149,8 @@ impl Case {
             })
             .concat();
         format!(
-            "title = \"{}\"\n[analysis]\ntype = \"quasi-static\"\nsteps = {}\n\
-             max_iterations = 20\n[method]\nbasis = \"gimp\"\n{ghost}\
+            "title = \"{}\"\n{ghost}[analysis]\ntype = \"quasi-static\"\nsteps = {}\n\
+             max_iterations = 20\n[method]\nbasis = \"gimp\"\n\
              [grid]\ntype = \"lattice\"\norigin = [{origin}]\ncells = {:?}\nh = {h}\n\
              [material.m]\nmodel = \"hencky\"\nyoung = {YOUNG:?}\npoisson = {POISSON}\n\
              [[body]]\nname = \"body\"\nmaterial = \"m\"\ndensity = 1.0\n\

@@ -5,6 +5,7 @@ use crate::common::run::Run;
 
 const DECK: &str = r#"
 title = "Blocks"
+ghost = "off"
 [analysis]
 type = "explicit"
 steps = 60

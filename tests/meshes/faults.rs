@@ -4,6 +4,7 @@ use crate::common::run::Run;
 
 const DECK: &str = r#"
 title = "fault"
+ghost = "off"
 [analysis]
 type = "quasi-static"
 steps = 2
@@ -207,6 +208,7 @@ fn domains_in_space_that_fold() {
     let mut deck = String::from(
         r#"
 title = "fold"
+ghost = "off"
 [analysis]
 type = "quasi-static"
 steps = 1

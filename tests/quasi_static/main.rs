@@ -7,6 +7,7 @@ mod common;
 mod beam;
 mod collapse;
 mod column;
+mod default_ghost;
 mod equality;
 mod round_off;
 mod shear;

@@ -21,7 +21,8 @@ pub const SECTIONS: &[Section] = &[
             key("title", Text, Default("\"\""), "Shown in the banner and stored with the results."),
             key("analysis", Table("analysis"), Required, "What is solved, and how finely."),
             key("method", Table("method"), Optional("all defaults"), "Variant of the method."),
-            key("ghost", Table("ghost"), Optional("absent: off"), "Ghost stabilisation."),
+            key("ghost", Table("ghost"), Optional("on, with the default factors of [ghost]"),
+                "Ghost stabilisation; `ghost = \"off\"`, before the first table, turns it off."),
             key("grid", Table("grid"), Required, "Background grid."),
             key("material", Named("material"), Required, "At least one `[material.NAME]`."),
             key("body", Tables("body"), Required, "At least one `[[body]]`."),
@@ -94,7 +95,7 @@ pub const SECTIONS: &[Section] = &[
                 Default("\"flip\""), "How points take their velocity from the grid (explicit)."),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
                 "Order m of XPIC(m).").range(at_least(1.0)),
-            key("drop_below", Number, Optional("1e-8 without Ghost stiffness, 0 with it and in explicit runs"),
+            key("drop_below", Number, Optional("0 with Ghost stiffness and in explicit runs, 1e-8 without"),
                 "Nodes whose summed basis weight is below this fraction of the largest are held at zero.")
                 .range(between(0.0, 1.0)),
         ],
@@ -102,7 +103,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "ghost",
         header: "[ghost]",
-        doc: "Ghost stabilisation (Ghost §3). An absolute value or a factor, not both.",
+        doc: "Ghost stabilisation (Ghost §3). Without this table, or without a stiffness and a mass in it, the default factors are in force: stiffness_factor = 0.01 in implicit analyses, and mass_factor = 0.25 in dynamics with the consistent mass (a conditioning study takes both). Nothing is stabilised in explicit analyses with the lumped mass, with method.control = \"fem\", and with `ghost = \"off\"`. A table with a stiffness or a mass says all: what it leaves out is not stabilised. An absolute value or a factor, not both. How the defaults were chosen: docs/evidence/ghost-factors.md.",
         keys: &[
             key("stiffness", Number, Optional("no Ghost stiffness"), "gamma_K.")
                 .unit("Pa").range(at_least(0.0)),

@@ -1,10 +1,12 @@
-//! `[analysis]`, `[method]`, `[ghost]`, `[conditioning]`.
+//! `[analysis]`, `[method]`, `[conditioning]`.
 
-use crate::deck::model::{Analysis, AnalysisType, Basis, Ghost, Mass, Method, PointVolume};
+use crate::deck::model::{Analysis, AnalysisType, Basis, Mass, Method, PointVolume};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::between;
 use crate::deck::tree::Value;
+
+use super::ghost::Wanted;
 
 pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
     let kind: Got<AnalysisType> = table.choice("type");
@@ -96,7 +98,7 @@ fn stable_newmark(table: &Table<'_>, beta: f64, gamma: f64) -> Got<()> {
 /// `ghost` and `kind`: what was read before, if that succeeded.
 pub fn method(
     table: &Table<'_>,
-    ghost: Option<&Option<Ghost>>,
+    ghost: Option<&Wanted>,
     kind: Option<AnalysisType>,
 ) -> Got<Method> {
     let basis: Got<Basis> = table.choice("basis");
@@ -114,9 +116,7 @@ pub fn method(
     if order.is_some() && !xpic {
         return Err(table.problem("xpic_order", "only with velocity_update = \"xpic\""));
     }
-    let stiffened = ghost.and_then(Option::as_ref).is_some_and(|ghost| {
-        ghost.stiffness.or(ghost.stiffness_factor).is_some_and(|value| value > 0.0)
-    });
+    let stiffened = ghost.is_some_and(|ghost| ghost.stiffens(kind));
     let mass = mass?;
     if xpic && mass == Mass::Consistent && table.given("mass") {
         return Err(table.problem(
@@ -167,36 +167,6 @@ fn velocity_update(table: &Table<'_>) -> Got<(f64, bool)> {
         },
         _ => Ok((table.number_from("velocity_update", node, between(0.0, 1.0))?, false)),
     }
-}
-
-pub fn ghost(table: &Table<'_>) -> Got<Ghost> {
-    let stiffness = table.number_if("stiffness");
-    let stiffness_factor = table.number_if("stiffness_factor");
-    let mass = table.number_if("mass");
-    let mass_factor = table.number_if("mass_factor");
-    let scaling = table.choice("scaling");
-    for (value, factor) in [("stiffness", "stiffness_factor"), ("mass", "mass_factor")] {
-        if table.given(value) {
-            table.refuse(&[factor], &format!("{value} is given too; leave one of them out"))?;
-        }
-    }
-    let keys = ["stiffness", "stiffness_factor", "mass", "mass_factor"];
-    if !keys.iter().any(|key| table.given(key)) {
-        let message =
-            "expected a stiffness or a mass: stiffness, stiffness_factor, mass or mass_factor";
-        return Err(table.problem_with_help(
-            "",
-            message,
-            "without [ghost] the stabilisation is off",
-        ));
-    }
-    Ok(Ghost {
-        stiffness: stiffness?,
-        stiffness_factor: stiffness_factor?,
-        mass: mass?,
-        mass_factor: mass_factor?,
-        scaling: scaling?,
-    })
 }
 
 /// The rigid motion of a conditioning study, for such an analysis only.

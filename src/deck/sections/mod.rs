@@ -2,7 +2,8 @@
 //!
 //! | file | sections |
 //! |---|---|
-//! | `analysis.rs` | analysis, method, ghost, conditioning |
+//! | `analysis.rs` | analysis, method, conditioning |
+//! | `ghost.rs` | ghost, and what is in force without it |
 //! | `grid.rs` | grid |
 //! | `bodies.rs` | material, body |
 //! | `shapes.rs` | body.shape |
@@ -13,6 +14,7 @@
 mod analysis;
 mod bodies;
 mod conditions;
+mod ghost;
 mod grid;
 mod restraint;
 mod results;
@@ -32,7 +34,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let root = Table::open(problems, schema::section(""), "", root)?;
     let title = root.text("title");
     let analysis = root.table("analysis", |table| analysis::analysis(&table));
-    let ghost = root.table_if("ghost", |table| analysis::ghost(&table));
+    let ghost = ghost::wanted(&root);
     let kind = analysis.as_ref().ok().map(|analysis| analysis.kind);
     let method = root
         .table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok(), kind));
@@ -65,13 +67,15 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     if let (Ok(analysis), Ok(boundaries)) = (&analysis, &boundaries) {
         restraint::check(&root, analysis, boundaries, dimension)?;
     }
+    let (analysis, method) = (analysis?, method?);
+    let ghost = ghost?.in_force(analysis.kind, method.mass);
     let mut deck = Deck {
         title: title?,
         dimension,
         directory: directory.to_path_buf(),
-        analysis: analysis?,
-        method: method?,
-        ghost: ghost?,
+        analysis,
+        method,
+        ghost,
         materials: materials?,
         bodies: bodies?,
         boundaries: boundaries?,
