@@ -44,7 +44,7 @@ iterations: setup
 scaling: build
 	python3 jobs/scaling.py all
 
-# Installs KratosMPMApplication from PyPI in target/compare/venv; prints the table of docs/compare.md.
+# Installs KratosMPMApplication from PyPI in target/compare/venv; prints the table of docs/evidence/compare.md.
 compare: build
 	python3 jobs/compare.py
 

@@ -1,4 +1,4 @@
-"""What the counts of scaling.py say of rank counts that nobody has here (docs/scaling.md)."""
+"""What the counts of scaling.py say of rank counts that nobody has here (docs/evidence/scaling.md)."""
 import csv
 import math
 
@@ -53,7 +53,7 @@ def model(weak, sizes, per_point):
 
 
 def write_model(path, rows):
-    """As csv to `path`, and as the table of docs/scaling.md to the terminal."""
+    """As csv to `path`, and as the table of docs/evidence/scaling.md to the terminal."""
     with open(path, "w", newline="") as file:
         csv.writer(file).writerows([COLUMNS] + rows)
     print(f"| {' | '.join(COLUMNS)} |\n" + "|---" * len(COLUMNS) + "|")

@@ -20,13 +20,13 @@ fn read(text: &str, sets: &[&str]) -> Deck {
 
 #[test]
 fn documentation_is_that_of_the_schema() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/deck.md");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/guide/deck.md");
     let text = reference::markdown();
     if std::env::var_os("UPDATE_DOCS").is_some() {
-        std::fs::write(&path, &text).expect("docs/deck.md can be written");
+        std::fs::write(&path, &text).expect("docs/guide/deck.md can be written");
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(found == text, "docs/deck.md is old: UPDATE_DOCS=1 cargo test --test deck_reference");
+    assert!(found == text, "docs/guide/deck.md is old: UPDATE_DOCS=1 cargo test --test deck_reference");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-"""Pictures of docs/validation-dynamics.md from results directories.
+"""Pictures of docs/evidence/validation-dynamics.md from results directories.
 
 python3 dynamics.py RESULTS OUT
 RESULTS holds those of translating-domain-mpm, translating-domain-gimp, translating-ghost and

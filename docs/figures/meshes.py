@@ -1,4 +1,4 @@
-"""Pictures of docs/validation-meshes.md from results directories.
+"""Pictures of docs/evidence/validation-meshes.md from results directories.
 
 python3 meshes.py RESULTS OUT
 RESULTS holds doughnut-{mpm,cpdi1,cpdi2,fem} and ellipse-{mpm,cpdi1,cpdi2,fem}.

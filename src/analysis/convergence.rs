@@ -3,7 +3,7 @@
 /// Whether the next error is likely below the tolerance: by Newton's method with solves that are
 /// not exact, between a fall by the last factor once more and by its square, or by the square of
 /// the error itself. Errors above one are those of a step's start, where nothing pushes yet.
-/// (docs/performance.md has how often that is right.)
+/// (docs/evidence/performance.md has how often that is right.)
 pub(crate) fn converges_next(errors: &[f64], tolerance: f64) -> bool {
     let [.., before, last] = errors[..] else { return false };
     let factor = (last / before.min(1.0)).min(1.0);

@@ -1,7 +1,7 @@
 //! Which linear solver a system gets by default: direct while that is cheap, multigrid beyond.
 //! The user's PETSc options with the prefix `-qs_` win over all of it.
 //!
-//! The limits come from measurements (docs/performance.md). Ghost stiffness bounds the condition
+//! The limits come from measurements (docs/evidence/performance.md). Ghost stiffness bounds the condition
 //! number, and multigrid wins early; without it multigrid may fail at any size, and nothing tells
 //! beforehand: it is tried, gives up early, and is left alone for some steps ([`Trials`]). A parallel
 //! direct solver sums in the order in which messages arrive; on one rank it repeats bit by bit, and

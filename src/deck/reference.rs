@@ -1,4 +1,4 @@
-//! The schema as documentation: `docs/deck.md` is this text.
+//! The schema as documentation: `docs/guide/deck.md` is this text.
 
 use super::expression;
 use super::fields::FIELDS;

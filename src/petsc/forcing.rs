@@ -33,7 +33,7 @@ pub struct Forcing {
 impl Forcing {
     /// Tighter than PETSc's choice (0.3, 0.9, 1, 1.6): the noise that a solve leaves decides now and
     /// then whether an iterate just passes, so that the count of evaluations and with it the answer
-    /// would depend on the number of ranks (docs/performance.md has the measurements).
+    /// would depend on the number of ranks (docs/evidence/performance.md has the measurements).
     pub fn new(smallest: f64) -> Self {
         Forcing {
             first: 1e-3,

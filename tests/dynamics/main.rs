@@ -1,6 +1,6 @@
 //! The dynamic cases of the Ghost paper, and what must hold of any dynamic run: each test runs
 //! decks of `inputs/` through the program. The longer ones are run by `make validate`, which
-//! also rewrites the tables of `docs/validation-dynamics.md`.
+//! also rewrites the tables of `docs/evidence/validation-dynamics.md`.
 
 #[path = "../common/mod.rs"]
 mod common;

@@ -6,7 +6,7 @@
 //! | `problem.rs` | keys of the analysis: analysis, method, ghost, grid, outputs |
 //! | `bodies.rs` | keys of what is analysed: materials, bodies, shapes, boundaries, loads |
 //!
-//! Known keys, type and range checks, defaults, the resolved deck and `docs/deck.md` all come
+//! Known keys, type and range checks, defaults, the resolved deck and `docs/guide/deck.md` all come
 //! from here.
 
 mod bodies;
