@@ -26,7 +26,10 @@ fn documentation_is_that_of_the_schema() {
         std::fs::write(&path, &text).expect("docs/guide/deck.md can be written");
     }
     let found = std::fs::read_to_string(&path).unwrap_or_default();
-    assert!(found == text, "docs/guide/deck.md is old: UPDATE_DOCS=1 cargo test --test deck_reference");
+    assert!(
+        found == text,
+        "docs/guide/deck.md is old: UPDATE_DOCS=1 cargo test --test deck_reference"
+    );
 }
 
 #[test]

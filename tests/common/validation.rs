@@ -18,7 +18,8 @@ pub fn record_in(page: &str, name: &str, header: &[&str], rows: &[Vec<String>]) 
     }
     let _alone = ONE_WRITER.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/evidence").join(page);
-    let text = std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("docs/evidence/{page}: {e}"));
+    let text =
+        std::fs::read_to_string(&path).unwrap_or_else(|e| panic!("docs/evidence/{page}: {e}"));
     let opening = format!("<!-- table {name} -->\n");
     let begin = text.find(&opening).unwrap_or_else(|| panic!("no place for table {name}"));
     let begin = begin + opening.len();
