@@ -101,7 +101,8 @@ fn study<const D: usize>(
         reactions: reactions(
             world,
             &model.grid,
-            &mesh.numbering,
+            &mesh,
+            points,
             &deck.boundaries,
             &conditions,
             &none,

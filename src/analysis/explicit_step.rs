@@ -124,14 +124,7 @@ pub(crate) fn advance<const D: usize>(
         time: span.time_end,
         dt,
         linear_iterations,
-        reactions: reactions(
-            world,
-            grid,
-            &mesh.numbering,
-            &deck.boundaries,
-            &conditions,
-            &residual,
-        ),
+        reactions: reactions(world, grid, &mesh, points, &deck.boundaries, &conditions, &residual),
         ..mesh.row(world, points)
     };
     let driven = mass.driven_energy(&mesh, &conditions.increment, dt);

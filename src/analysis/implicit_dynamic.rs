@@ -2,8 +2,15 @@
 //! implicit dynamics by Newmark's method (α = 0) or that of Hilber, Hughes and Taylor, over the
 //! equations of the quasi-static analysis (Ghost §2.4) with the stabilised mass (Ghost §3.3).
 //!
-//! Velocity and acceleration come from the points by Ghost eq. 10 and return as increments
-//! (velocity, by the deck's FLIP share) and values (acceleration).
+//! Velocities come from the points by Ghost eq. 10 and return as increments, by the deck's FLIP
+//! share. The acceleration a of a step's start is that of the forces there, M~ a = f_ext - f_int:
+//! one that came back from the points would have passed the grid twice, which a lumped mass and the
+//! Ghost mass smooth, and energy is lost at each step. Newmark's method is then of one step, in
+//! positions and velocities alone. With α < 0 the acceleration does come from the points: it holds
+//! the force of the step before, by which that method damps.
+//!
+//! A boundary's reaction is the mean (1 - γ) r + γ r' of what it supplies at both ends of the step:
+//! Σ m v' - Σ m v = dt (Σ reactions + Σ mean loads) to round-off, as M~ (v' - v) is made of just these.
 
 use crate::error::{Error, Result};
 use crate::output::restart::run_state::RunState;
@@ -193,10 +200,11 @@ fn solve_step<const D: usize>(
         clock.time(Phase::Assemble, || GridMass::assemble(world, &mesh, step, deck.method.mass))?;
     let loads =
         clock.time(Phase::Assemble, || Loads::of_step(world, model, points, &mesh, span))?;
-    let start = clock.time(Phase::Solve, || {
+    let (start, momentum) = clock.time(Phase::Solve, || {
         let held = held_or_left_out::<D>(&conditions, &left_out);
         let inverse = mass.inverse(world, &model.grid, &mesh, &held)?;
-        rates_at_start(inverse, step, points, &conditions, &loads, span)
+        let carried = newmark.alpha != 0.0 && span.time_start > 0.0;
+        rates_at_start(inverse, step, points, &conditions, &loads, newmark.dt, carried)
     })?;
 
     let (driving, problem) = clock.time(Phase::Assemble, || {
@@ -232,15 +240,26 @@ fn solve_step<const D: usize>(
     };
 
     let end = newmark.rates(&start, &displacement);
-    // What the boundaries supply.
-    let supplied: Vec<f64> =
+    // What the boundaries supply: at both ends of the step, and in the mean.
+    let at_end: Vec<f64> =
         solved.internal.iter().zip(&driving).map(|(force, driving)| force - driving).collect();
+    let at_start = match newmark.alpha {
+        0.0 => difference(mass.multiply(&mesh, &start.acceleration), &loads.balance_start),
+        _ => at_end.clone(),
+    };
+    let mut supplied = newmark.mean(&at_start, &at_end);
+    if deck.method.flip < 1.0 {
+        // Points that take the nodes' velocity lose what held nodes had of theirs.
+        let taken = difference(mass.multiply(&mesh, &start.velocity), &momentum);
+        let share = (1.0 - deck.method.flip) / newmark.dt;
+        supplied.iter_mut().zip(taken).for_each(|(force, taken)| *force += share * taken);
+    }
     let work = work_of_step::<D>(
         &conditions,
         numbering,
         &displacement,
         [&loads.external_start, &loads.external_end],
-        [&supplied, &supplied],
+        [&at_start, &at_end],
     );
     let ghost = mass.ghost_energy(&mesh, &end.velocity);
     let energies = clock.time(Phase::Update, || {
@@ -277,7 +296,8 @@ fn solve_step<const D: usize>(
         reactions: reactions(
             world,
             &model.grid,
-            numbering,
+            &mesh,
+            points,
             &deck.boundaries,
             &conditions,
             &supplied,
@@ -333,25 +353,31 @@ fn held_or_left_out<const D: usize>(conditions: &Conditions, left_out: &[bool]) 
     held
 }
 
-/// Nodal velocity and acceleration from the points' (Ghost eq. 10). Collective.
+/// Nodal velocity from the points' (Ghost eq. 10), acceleration from the forces or, `carried`, from
+/// the points' too; beside them the nodes' momentum, Σ m S^T v. Collective.
+#[allow(clippy::too_many_arguments)]
 fn rates_at_start<const D: usize>(
     mut inverse: Inverse<'_, D>,
     step: StepPoints<'_, D>,
     points: &Points<D>,
     conditions: &Conditions,
     loads: &Loads<D>,
-    span: StepSpan,
-) -> Result<Rates> {
+    dt: f64,
+    carried: bool,
+) -> Result<(Rates, Vec<f64>)> {
     let nodes = conditions.fixed.len() / D;
-    let dt = span.time_end - span.time_start;
     let held_velocity: Vec<f64> = conditions.increment.iter().map(|u| u / dt).collect();
-    let velocity =
-        inverse.solve(mapping::momentum(step, &points.velocity, nodes), &held_velocity)?;
-    // The first step has no history: its acceleration is that of the forces.
-    let sums = match span.time_start {
-        0.0 => loads.share_at_start.clone(),
-        _ => mapping::momentum(step, &points.acceleration, nodes),
+    let momentum = inverse.summed(mapping::momentum(step, &points.velocity, nodes))?;
+    let velocity = inverse.solve_to_ghosts(&momentum, &held_velocity, None)?;
+    let sums = match carried {
+        false => loads.share_at_start.clone(),
+        true => mapping::momentum(step, &points.acceleration, nodes),
     };
     let acceleration = inverse.solve(sums, &vec![0.0; nodes * D])?;
-    Ok(Rates { velocity, acceleration })
+    Ok((Rates { velocity, acceleration }, momentum.into_flattened()))
+}
+
+/// a - b over the shorter of both.
+fn difference(a: Vec<f64>, b: &[f64]) -> Vec<f64> {
+    a.into_iter().zip(b).map(|(a, b)| a - b).collect()
 }

@@ -35,6 +35,12 @@ impl Newmark {
         1.0 / (self.beta * self.dt.powi(2))
     }
 
+    /// Mean over the step of what acts on the velocity, from its values at both ends.
+    pub fn mean(&self, start: &[f64], end: &[f64]) -> Vec<f64> {
+        let ends = start.iter().zip(end);
+        ends.map(|(start, end)| (1.0 - self.gamma) * start + self.gamma * end).collect()
+    }
+
     /// What the acceleration at the end owes to the start, with its sign reversed.
     pub fn predictor(&self, start: &Rates) -> Vec<f64> {
         let rates = start.velocity.iter().zip(&start.acceleration);

@@ -210,7 +210,8 @@ fn solve_step<const D: usize>(
         reactions: reactions(
             world,
             &model.grid,
-            numbering,
+            &mesh,
+            points,
             &deck.boundaries,
             &conditions,
             &supplied,

@@ -151,9 +151,15 @@ enum How<'a, const D: usize> {
 impl<const D: usize> Inverse<'_, D> {
     /// M x = `sums`, where held x = `prescribed` (local). `sums` are nodal sums of this rank's
     /// points, sent to their owners here. Returns local values. Collective.
-    pub fn solve(&mut self, mut sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
-        self.mesh.numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
+    pub fn solve(&mut self, sums: Vec<[f64; D]>, prescribed: &[f64]) -> Result<Vec<f64>> {
+        let sums = self.summed(sums)?;
         self.solve_to_ghosts(&sums, prescribed, None)
+    }
+
+    /// Nodal sums of this rank's points with those of the others, at the owned nodes. Collective.
+    pub fn summed(&self, mut sums: Vec<[f64; D]>) -> Result<Vec<[f64; D]>> {
+        self.mesh.numbering.halo.reverse_add(self.world, sums.as_flattened_mut(), D)?;
+        Ok(sums)
     }
 
     /// [`Self::solve_summed`] with the values at the ghosts. Collective.

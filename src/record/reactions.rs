@@ -5,29 +5,34 @@ use crate::deck::model::Boundary;
 use crate::grid::Grid;
 use crate::output::tables::history::Reaction;
 use crate::parallel::World;
+use crate::points::Points;
 use crate::system::conditions::Conditions;
-use crate::system::numbering::Numbering;
+use crate::system::step_system::Discretisation;
 
-/// Sums what each boundary supplies over the degrees of freedom it holds; `supplied`: f_int - f_ext
-/// of the owned ones, N. The torque is about the boundary's centre of rotation, else about the
-/// origin. Collective.
+/// Sums what each boundary supplies over the degrees of freedom that follow it
+/// ([`Conditions::members`]); `supplied`: f_int - f_ext of the owned ones, N. The torque is about the
+/// boundary's centre of rotation, else about the origin. The material held is the share of the
+/// points' volume that their basis gives to the nodes held. Collective.
 pub fn reactions<const D: usize>(
     world: &World,
     grid: &Grid<D>,
-    numbering: &Numbering,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
     boundaries: &[Boundary],
     conditions: &Conditions,
     supplied: &[f64],
 ) -> Vec<Reaction> {
+    let held = held_volumes(mesh, points, conditions);
     boundaries
         .iter()
-        .zip(&conditions.members)
-        .map(|(boundary, members)| {
+        .zip(conditions.members.iter().zip(held))
+        .map(|(boundary, (members, held))| {
             let centre = boundary
                 .rotation
                 .as_ref()
                 .map_or([0.0; 2], |rotation| [rotation.centre[0], rotation.centre[1]]);
-            let mut sums = [0.0; 5];
+            let mut sums = [0.0; 6];
+            sums[5] = held;
             let mut at = 0;
             while at < members.len() {
                 let node = members[at] as usize / D;
@@ -37,7 +42,7 @@ pub fn reactions<const D: usize>(
                     force[dof % D] = supplied[dof];
                     at += 1;
                 }
-                let x = grid.node_position(numbering.nodes[node]);
+                let x = grid.node_position(mesh.numbering.nodes[node]);
                 for (sum, f) in sums.iter_mut().zip(force) {
                     *sum += f;
                 }
@@ -45,9 +50,46 @@ pub fn reactions<const D: usize>(
                 sums[4] += (x[0] - centre[0]) * force[1] - (x[1] - centre[1]) * force[0];
             }
             let sums = world.sum_slice(&sums);
-            Reaction { force: [sums[0], sums[1], sums[2]], sum_abs: sums[3], torque: sums[4] }
+            Reaction {
+                force: [sums[0], sums[1], sums[2]],
+                sum_abs: sums[3],
+                torque: sums[4],
+                held: sums[5],
+            }
         })
         .collect()
+}
+
+/// Σ_p V_p Σ_v S_vp over the nodes v that each boundary holds, this rank's points, m3.
+fn held_volumes<const D: usize>(
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    conditions: &Conditions,
+) -> Vec<f64> {
+    let mut sums = vec![0.0; conditions.held_nodes.len()];
+    let mut weights = vec![0.0; sums.len()];
+    let groups = &mesh.groups;
+    for group in 0..groups.len() {
+        let nodes = &mesh.group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
+        let held = |node: u32| conditions.fixed[node as usize * D..][..D].contains(&true);
+        if !nodes.iter().any(|&node| held(node)) {
+            continue;
+        }
+        for &p in groups.points(group) {
+            weights.fill(0.0);
+            let shares = &mesh.influences.weights[mesh.influences.row(p)];
+            for (node, share) in nodes.iter().zip(shares).filter(|(node, _)| held(**node)) {
+                for (weight, nodes) in weights.iter_mut().zip(&conditions.held_nodes) {
+                    if nodes.binary_search(node).is_ok() {
+                        *weight += share;
+                    }
+                }
+            }
+            let volume = points.volume(p);
+            sums.iter_mut().zip(&weights).for_each(|(sum, weight)| *sum += weight * volume);
+        }
+    }
+    sums
 }
 
 /// The nodal force that boundaries supply where they hold, N; zero elsewhere.

@@ -44,6 +44,9 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
+    /// Names of the deck's boundaries and the volume that each held in the first row of this
+    /// process, m3.
+    holds: Vec<(String, Option<f64>)>,
     /// The last step with a row in the history.
     recorded: usize,
     /// Those of them before a restart.
@@ -159,6 +162,7 @@ impl Recorder {
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
+            holds: deck.boundaries.iter().map(|b| (b.name.clone(), None)).collect(),
             recorded: 0,
             earlier_steps: 0,
             reached: (0.0, 0.0),
@@ -318,6 +322,7 @@ impl Recorder {
         self.seconds = self.earlier_seconds + row.wall_seconds;
         let whole_run = HistoryRow { wall_seconds: self.seconds, ..row.clone() };
         self.history.push(&whole_run, world.comm())?;
+        self.watch_boundaries(row);
         self.recorded = row.step;
         self.reached = (row.load_factor, row.time);
         self.populated_cells = row.populated_cells;
@@ -338,6 +343,24 @@ impl Recorder {
         };
         self.progress.step(&mut self.log, &report);
         Ok(())
+    }
+
+    /// Warns of boundaries that the bodies have left since the first row. One that held nothing then
+    /// waits for a body, which may come and go.
+    fn watch_boundaries(&mut self, row: &HistoryRow) {
+        for ((name, first), reaction) in self.holds.iter_mut().zip(&row.reactions) {
+            let (first, held) = (*first.get_or_insert(reaction.held), reaction.held);
+            if 4.0 * held >= first {
+                continue;
+            }
+            let text = format!(
+                "boundary \"{name}\" holds less than a quarter of the material that it held at first: \
+                 the material has left its nodes, and its reaction is no longer that of a support. \
+                 Nodes that follow a body are found by where = {{ cells_of = \"...\" }}"
+            );
+            let detail = format!("(reaction.{name}.held is {held:.3e}, {first:.3e} at first)");
+            self.log.warn_of_step(row.step, &text, &detail);
+        }
     }
 
     /// A step that could be solved but not written is not a completed one.

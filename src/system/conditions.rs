@@ -29,8 +29,12 @@ pub struct Conditions {
     pub fixed: Vec<bool>,
     /// Increment over the step, m; zero where free.
     pub increment: Vec<f64>,
-    /// Owned degrees of freedom of each boundary of the deck, ascending.
+    /// Owned degrees of freedom whose reaction is that of each boundary of the deck, ascending. Where
+    /// several hold a component of a node it is that of the one whose motion the node follows, of
+    /// equal ones the first in the deck: every reaction counts once.
     pub members: Vec<Vec<u32>>,
+    /// Local nodes that each boundary holds in some component, ascending, shared ones included.
+    pub held_nodes: Vec<Vec<u32>>,
 }
 
 impl Conditions {
@@ -48,12 +52,16 @@ impl Conditions {
             fixed: vec![false; numbering.len() * D],
             increment: vec![0.0; numbering.len() * D],
             members: vec![Vec::new(); boundaries.len()],
+            held_nodes: vec![Vec::new(); boundaries.len()],
         };
+        // Place in the deck of the boundary that a degree of freedom follows.
+        let mut leader = vec![usize::MAX; numbering.len() * D];
         let mut problem = None;
         for (b, boundary) in boundaries.iter().enumerate() {
             let inside = members(world, grid, basis, numbering, points, &boundary.place)?;
             for local in (0..numbering.len()).filter(|&local| inside[local]) {
                 let node = numbering.nodes[local];
+                conditions.held_nodes[b].push(local as u32);
                 let mut held: [Option<f64>; D] = [None; D];
                 for &component in &boundary.fix {
                     held[component] = Some(0.0);
@@ -96,11 +104,16 @@ impl Conditions {
                     if !clash || value != 0.0 {
                         conditions.increment[dof] = value;
                     }
-                    conditions.fixed[dof] = true;
-                    if local < numbering.owned {
-                        conditions.members[b].push(dof as u32);
+                    if !conditions.fixed[dof] || (clash && value != 0.0) {
+                        leader[dof] = b;
                     }
+                    conditions.fixed[dof] = true;
                 }
+            }
+        }
+        for (dof, &b) in leader[..numbering.owned * D].iter().enumerate() {
+            if let Some(members) = conditions.members.get_mut(b) {
+                members.push(dof as u32);
             }
         }
         match world.first_message(problem) {

@@ -19,7 +19,7 @@ impl Block {
         let Block { lower, upper, density, size, steps } = self;
         let (half, height, h) = (0.5 * size, 1.25 * size, 0.125 * size);
         Run::text(&format!(
-            "[analysis]\ntype = \"quasi-static\"\nsteps = {steps}\n\
+            "ghost = \"off\"\n[analysis]\ntype = \"quasi-static\"\nsteps = {steps}\n\
              [method]\nbasis = \"mpm\"\n\
              [grid]\ntype = \"lattice\"\nsize = [{size:e}, {height:e}]\nh = {h:e}\n\
              [material.lower]\nmodel = \"hencky\"\nyoung = {lower:e}\npoisson = 0.3\n\
@@ -111,9 +111,9 @@ fn the_unit_of_stress_changes_nothing() {
 
 /// An unloaded block carried about by its foot, without or with Ghost stiffness.
 fn carried(motion: &str, foot: f64, ghost: bool) -> Run {
-    let ghost = if ghost { "[ghost]\nstiffness_factor = 0.1\n" } else { "" };
+    let ghost = if ghost { "ghost = { stiffness_factor = 0.1 }\n" } else { "ghost = \"off\"\n" };
     Run::text(&format!(
-        "[analysis]\ntype = \"quasi-static\"\nsteps = 5\n[method]\nbasis = \"mpm\"\n{ghost}\
+        "{ghost}[analysis]\ntype = \"quasi-static\"\nsteps = 5\n[method]\nbasis = \"mpm\"\n\
          [grid]\ntype = \"lattice\"\norigin = [-1.0, -1.0]\nsize = [3.0, 3.0]\nh = 0.25\n\
          [material.m]\nmodel = \"hencky\"\nyoung = 1e6\npoisson = 0.3\n\
          [[body]]\nmaterial = \"m\"\ndensity = 1000.0\npoints_per_cell = [3, 3]\n\
@@ -158,7 +158,7 @@ fn a_state_without_force_is_solved() {
 /// E' A strain: the reaction of a bar at a strain of 1e-7, to a tolerance of 1e-10.
 #[test]
 fn a_bar_at_a_small_strain_meets_a_small_tolerance() {
-    let bar = "[analysis]\ntype = \"quasi-static\"\nsteps = 3\ntolerance = 1e-10\n\
+    let bar = "ghost = \"off\"\n[analysis]\ntype = \"quasi-static\"\nsteps = 3\ntolerance = 1e-10\n\
          [method]\nbasis = \"mpm\"\n\
          [grid]\ntype = \"lattice\"\nsize = [4.5, 1.0]\nh = 0.5\n\
          [material.m]\nmodel = \"hencky\"\nyoung = 2e11\npoisson = 0.3\n\

@@ -133,7 +133,7 @@ pub const SECTIONS: &[Section] = &[
         doc: "Prescribed displacement of grid nodes: at least one of fix, displacement and rotation.",
         keys: &[
             key("name", Text, Optional("boundary-1, boundary-2, ..."),
-                "Names the reaction columns, unique."),
+                "Names the reaction columns, unique. A component of a node that several boundaries hold counts for the one whose motion the node follows, of equal ones for the first in the deck."),
             key("where", Table("where"), Required, "Which nodes."),
             key("fix", Choices(&AXES), Optional("none"), "Components held at zero."),
             key("displacement", Table("displacement"), Optional("none"), "Prescribed components."),

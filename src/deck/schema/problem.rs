@@ -92,7 +92,7 @@ pub const SECTIONS: &[Section] = &[
             key("position_update", Choice(PositionUpdate::NAMES), Default("\"momentum\""),
                 "What moves the points of an explicit step with the consistent mass: the velocity that keeps the angular momentum, or the updated nodal velocity (published: Ghost eq. 9)."),
             key("velocity_update", Special("\"flip\", \"pic\", \"xpic\", or a number from 0 (pic) to 1 (flip)"),
-                Default("\"flip\""), "How points take their velocity from the grid (explicit)."),
+                Default("\"flip\""), "How points take their velocity from the grid, in explicit and implicit dynamics; xpic is explicit."),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
                 "Order m of XPIC(m).").range(at_least(1.0)),
             key("drop_below", Number, Optional("0 with Ghost stiffness and in explicit runs, 1e-8 without"),

@@ -116,6 +116,13 @@ pub fn method(
     if order.is_some() && !xpic {
         return Err(table.problem("xpic_order", "only with velocity_update = \"xpic\""));
     }
+    if xpic && kind.is_some_and(|kind| kind != AnalysisType::Explicit) {
+        return Err(table.problem(
+            "velocity_update",
+            "\"xpic\" is for analysis.type = \"explicit\"; implicit dynamics reads \"flip\", \"pic\" or \
+             a number",
+        ));
+    }
     let stiffened = ghost.is_some_and(|ghost| ghost.stiffens(kind));
     let mass = mass?;
     if xpic && mass == Mass::Consistent && table.given("mass") {

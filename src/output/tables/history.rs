@@ -72,6 +72,8 @@ pub struct Reaction {
     pub sum_abs: f64,
     /// About the boundary's centre of rotation, or the origin.
     pub torque: f64,
+    /// Volume of the material that its nodes hold, m3 (m2 in plane strain).
+    pub held: f64,
 }
 
 /// Condition numbers and stability limits of one position of the bodies.
@@ -124,6 +126,7 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
         }
         cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
         cell(format!("reaction.{name}.torque"), torque, reaction.torque);
+        cell(format!("reaction.{name}.held"), unit("m3", "m2"), reaction.held);
     }
     cell("ghost_faces".into(), "-", row.ghost_faces as f64);
     cell("populated_cells".into(), "-", row.populated_cells as f64);
@@ -202,7 +205,7 @@ mod tests {
              energy_ghost [J/m],work_external [J/m],momentum_x [kg/s],momentum_y [kg/s],\
              momentum_z [kg/s],angular_momentum_x [kg m/s],angular_momentum_y [kg m/s],\
              angular_momentum_z [kg m/s],reaction.root.x [N/m],reaction.root.y [N/m],\
-             reaction.root.sum_abs [N/m],reaction.root.torque [N],ghost_faces [-],\
+             reaction.root.sum_abs [N/m],reaction.root.torque [N],reaction.root.held [m2],ghost_faces [-],\
              populated_cells [-],cuts [-],imbalance [-],moved_points [-],\
              wall_seconds [s]"
         );
@@ -212,7 +215,7 @@ mod tests {
     fn values_stand_under_their_names() {
         let layout =
             Layout { dimension: 3, boundaries: vec!["a".into(), "b".into()], conditioning: true };
-        let reaction = Reaction { force: [1.0, 2.0, 3.0], sum_abs: 4.0, torque: 5.0 };
+        let reaction = Reaction { force: [1.0, 2.0, 3.0], sum_abs: 4.0, torque: 5.0, held: 8.0 };
         let row = HistoryRow {
             step: 12,
             momentum: [0.0, 6.0, 0.0],
@@ -227,6 +230,7 @@ mod tests {
         assert_eq!(value("reaction.a.z"), 0.0);
         assert_eq!(value("reaction.b.z"), 3.0);
         assert_eq!(value("reaction.b.torque"), 5.0);
+        assert_eq!(value("reaction.b.held"), 8.0);
         assert_eq!(value("cfl_ghost"), 7.0);
     }
 }

@@ -158,7 +158,7 @@ fn boundaries<const D: usize>(
             }
             other => other,
         })?;
-        if world.sum_usize(found.members[0].len()) == 0 {
+        if !world.any(!found.held_nodes[0].is_empty()) {
             warnings.push(format!(
                 "boundary \"{}\" acts on nothing at the start: no node of it touches a \
                  cell that holds material",
