@@ -13,6 +13,7 @@ use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 
 use crate::mass::grid_mass::{GridMass, Inverse, require_mass};
+use crate::mass::light_nodes::LightNodes;
 use crate::record::clock::Clock;
 use crate::system::step_system::{Discretisation, Model};
 use crate::transfer::mapping::{self, Pushed};
@@ -47,6 +48,7 @@ pub(crate) struct Nodes<'a, const D: usize> {
     mesh: &'a Discretisation<D>,
     conditions: &'a Conditions,
     mass: &'a GridMass,
+    light: Option<LightNodes>,
     pub inverse: Inverse<'a, D>,
     /// Of the points, N; empty without loads.
     external: &'a [[f64; D]],
@@ -82,7 +84,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         model: &'a Model<D>,
         mesh: &'a Discretisation<D>,
         conditions: &'a Conditions,
-        mass: &'a GridMass,
+        (mass, light): (&'a GridMass, Option<LightNodes>),
         external: &'a [[f64; D]],
         dt: f64,
     ) -> Result<Self> {
@@ -97,6 +99,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
             mesh,
             conditions,
             mass,
+            light,
             inverse,
             external,
             dt,
@@ -118,21 +121,24 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let step = self.mesh.step_points(points, &self.model.materials);
         let (deck, halo) = (&self.model.deck, &self.mesh.numbering.halo);
         let (momentum, mut velocity, forces) = if deck.method.stress_update == StressUpdate::Usf {
-            let momentum =
-                clock.time(Phase::Assemble, || Ok(self.momentum(step, &points.velocity)))?;
-            let velocity = self.solve(&momentum, None)?;
+            let momentum = clock.time(Phase::Assemble, || self.momentum(step, &points.velocity))?;
+            let velocity = self.solve(step, &momentum, None)?;
             (momentum, velocity, None)
         } else {
-            let [momentum, pushed] = clock.time(Phase::Assemble, || {
+            let [mut momentum, mut pushed] = clock.time(Phase::Assemble, || {
                 Ok(over_points(self.world, self.mesh, |part, [momenta, forces]| {
                     mapping::add_momentum_and_force(step, part, self.external, momenta, forces);
                 }))
             })?;
+            self.hand_on(step, &mut momentum)?;
+            self.hand_on(step, &mut pushed)?;
             self.require_mass(&pushed)?;
             let prescribed: [&[f64]; 2] = [&self.held_velocity, &self.at_rest];
-            let [velocity, acceleration] = timed(&mut self.seconds, || {
+            let [mut velocity, mut acceleration] = timed(&mut self.seconds, || {
                 self.inverse.solve_two([&momentum, &pushed], prescribed)
             })?;
+            self.carry(step, &mut velocity)?;
+            self.carry(step, &mut acceleration)?;
             (momentum, velocity, Some(Forces { pushed, acceleration }))
         };
         let takes = deck.method.flip < 1.0 && !deck.boundaries.is_empty();
@@ -169,14 +175,16 @@ impl<'a, const D: usize> Nodes<'a, D> {
         clock: &mut Clock,
     ) -> Result<Forces<D>> {
         let step = self.mesh.step_points(points, &self.model.materials);
-        let [pushed] = clock.time(Phase::Assemble, || {
+        let [mut pushed] = clock.time(Phase::Assemble, || {
             Ok(over_points(self.world, self.mesh, |part, [forces]| {
                 mapping::add_force(step, part, self.external, deformation, forces);
             }))
         })?;
+        self.hand_on(step, &mut pushed)?;
         self.require_mass(&pushed)?;
-        let acceleration =
+        let mut acceleration =
             timed(&mut self.seconds, || self.inverse.solve_summed(&pushed, &self.at_rest, None))?;
+        self.carry(step, &mut acceleration)?;
         Ok(Forces { pushed, acceleration })
     }
 
@@ -208,7 +216,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let flip = self.model.deck.method.flip;
         let mut deforming = if carrier == Carrier::RemappedBack && flip < 1.0 {
             let shared = blend(flip, &points.velocity, &mapping::at_points(step, velocity));
-            self.solve(&self.momentum(step, &shared), None)?
+            self.solve(step, &self.momentum(step, &shared)?, None)?
         } else {
             velocity.to_vec()
         };
@@ -236,7 +244,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let mut moving = velocity.to_vec();
         let mut again = None;
         if carrier.needs_solve() || musl {
-            let solved = self.solve(&self.momentum(step, new_velocity), Some(velocity))?;
+            let solved = self.solve(step, &self.momentum(step, new_velocity)?, Some(velocity))?;
             if carrier.needs_solve() {
                 moving.clone_from(&solved);
             }
@@ -255,17 +263,43 @@ impl<'a, const D: usize> Nodes<'a, D> {
     }
 
     /// Σ_p m S^T v at the owned nodes. Collective.
-    fn momentum(&self, step: StepPoints<'_, D>, velocity: &[[f64; D]]) -> Vec<[f64; D]> {
-        let [momentum] = over_points(self.world, self.mesh, |part, [momenta]| {
+    fn momentum(&self, step: StepPoints<'_, D>, velocity: &[[f64; D]]) -> Result<Vec<[f64; D]>> {
+        let [mut momentum] = over_points(self.world, self.mesh, |part, [momenta]| {
             mapping::add_momentum(step, part, velocity, momenta);
         });
-        momentum
+        self.hand_on(step, &mut momentum)?;
+        Ok(momentum)
+    }
+
+    /// Hands on what acts at light nodes. Collective.
+    fn hand_on(&self, step: StepPoints<'_, D>, sums: &mut [[f64; D]]) -> Result<()> {
+        match &self.light {
+            Some(light) => light.hand_on(self.world, self.mesh, step, sums, &self.conditions.fixed),
+            None => Ok(()),
+        }
+    }
+
+    /// Lets light nodes move along with the others. Collective.
+    fn carry(&self, step: StepPoints<'_, D>, nodal: &mut [f64]) -> Result<()> {
+        match &self.light {
+            Some(light) => light.carry(self.world, self.mesh, step, nodal, &self.conditions.fixed),
+            None => Ok(()),
+        }
     }
 
     /// M~^-1 of sums at the owned nodes, with the boundaries' velocity, at all local nodes; from a
     /// `guess` near it if there is one. Collective.
-    fn solve(&mut self, sums: &[[f64; D]], guess: Option<&[f64]>) -> Result<Vec<f64>> {
-        timed(&mut self.seconds, || self.inverse.solve_to_ghosts(sums, &self.held_velocity, guess))
+    fn solve(
+        &mut self,
+        step: StepPoints<'_, D>,
+        sums: &[[f64; D]],
+        guess: Option<&[f64]>,
+    ) -> Result<Vec<f64>> {
+        let mut solved = timed(&mut self.seconds, || {
+            self.inverse.solve_to_ghosts(sums, &self.held_velocity, guess)
+        })?;
+        self.carry(step, &mut solved)?;
+        Ok(solved)
     }
 
     /// What is pushed must have mass. Collective.
@@ -288,14 +322,15 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let mut term = velocity;
         for _ in 1..order {
             let back = mapping::at_points(step, &term);
-            let momentum = self.momentum(step, &back);
+            let momentum = self.momentum(step, &back)?;
             if !self.taken.is_empty() {
                 // The next term is this one less what is mapped back, so that its momentum over all
                 // nodes is what the held ones keep of it.
                 self.take(-1.0, &term, &momentum);
             }
-            let mapped =
+            let mut mapped =
                 timed(&mut self.seconds, || self.inverse.solve_to_ghosts(&momentum, &term, None))?;
+            self.carry(step, &mut mapped)?;
             for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
                 *t -= m;
                 *s += *t;

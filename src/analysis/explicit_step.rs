@@ -15,6 +15,7 @@ use crate::tensor::Square;
 use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
 use super::step_end::Solved;
 use crate::mass::grid_mass::GridMass;
+use crate::mass::light_nodes::LightNodes;
 use crate::record::clock::Clock;
 use crate::record::ledger::StepSums;
 use crate::record::reactions::{at_held, reactions};
@@ -51,11 +52,13 @@ pub(crate) fn advance<const D: usize>(
     } else {
         model.point_forces(world, points, span.factor_start, span.time_start)?
     };
-    let mass = clock.time(Phase::Assemble, || {
+    let (mass, light) = clock.time(Phase::Assemble, || {
         let step = mesh.step_points(points, &model.materials);
-        GridMass::assemble(world, &mesh, step, method.mass)
+        let mut mass = GridMass::assemble(world, &mesh, step, method.mass)?;
+        let light = LightNodes::find(world, &mesh, step, grid.cell_size(), &mut mass)?;
+        Ok((mass, light))
     })?;
-    let mut nodes = Nodes::new(world, model, &mesh, &conditions, &mass, &external, dt)?;
+    let mut nodes = Nodes::new(world, model, &mesh, &conditions, (&mass, light), &external, dt)?;
 
     let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;
     let carrier = carrier(model);

@@ -70,8 +70,8 @@ pub fn solve<const D: usize>(
         world,
         &mut problem,
         stabilised,
-        // Domains that share corners leave cells with more nodes than those corners tell apart.
-        !stabilised && model.deck.method.basis == Basis::Cpdi2,
+        // Domains leave cells with more nodes than the corners in them tell apart.
+        !stabilised && matches!(model.deck.method.basis, Basis::Cpdi1 | Basis::Cpdi2),
         numbering.total * D,
         trials,
         &mut matrix,

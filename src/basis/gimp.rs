@@ -2,9 +2,10 @@
 //!
 //! The mean of a hat function over an interval is summed cell by cell, where the hat is linear:
 //! the share of the domain in the cell times the hat at the middle of that piece. This is exact
-//! for any half length and free of cancellation. The hats of the grid's outermost nodes reach one
-//! cell beyond its edge, as the formula says: a domain that sticks out keeps most of its weight
-//! (Lagrangian Table 7 depends on it), though no longer a sum of one.
+//! for any half length and free of cancellation. Where a domain sticks out of the grid, the straight
+//! lines of the grid's outer cell go on beyond its edge: S sums to one and reproduces linear fields
+//! there too, so that no weight is lost. The formula alone would need the node beyond the edge; its
+//! share s^2 / (4 l_p h), s the length that sticks out, is given to the outer two nodes as 2 and -1.
 //!
 //! A cell is populated when it is overlapped along each axis; one that is only touched, to the
 //! rounding of the position, is not. The cell that holds the centre always counts. The row of a
@@ -12,6 +13,7 @@
 
 use super::product::{Line, for_each_index, push_row};
 use super::{Influences, lattice_of, outside};
+use crate::deck::model::GimpEdge;
 use crate::error::{Error, Result};
 use crate::grid::lattice::LINE_TOLERANCE;
 use crate::grid::{Grid, Lattice};
@@ -78,6 +80,7 @@ pub(crate) fn spans<const D: usize>(
 
 pub(crate) fn map_points<const D: usize>(
     grid: &Grid<D>,
+    edge: GimpEdge,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
     let lattice = lattice_of(grid)?;
@@ -89,7 +92,8 @@ pub(crate) fn map_points<const D: usize>(
             let centre = lattice.scaled(axis, points.position[p][axis]);
             let reach = points.half_length[p][axis] / lattice.spacing[axis];
             let (cells, spacing) = (lattice.cells[axis], lattice.spacing[axis]);
-            fill(&mut lines[axis], spans[axis], centre, reach, cells, spacing);
+            let end = (edge == GimpEdge::Published).then_some(cells);
+            fill(&mut lines[axis], spans[axis], centre, reach, spacing, end);
         }
         push_row(lattice, &lines, &mut influences);
     }
@@ -111,30 +115,39 @@ pub(crate) fn populated_cells<const D: usize>(
 }
 
 /// Fills `line` with the means of the hats over [centre - reach, centre + reach], in cells.
+/// `published`: the cells of the grid, where the hats of its outermost nodes fall to zero beyond it.
 #[inline]
-fn fill(line: &mut Line, span: Span, centre: f64, reach: f64, cells: usize, spacing: f64) {
+fn fill(
+    line: &mut Line,
+    span: Span,
+    centre: f64,
+    reach: f64,
+    spacing: f64,
+    published: Option<usize>,
+) {
     let last = span.last - span.first;
     line.reset(span.first, last + 2);
     // Distances are taken from the span's first node, so large grids cost no digits. The
-    // outermost pieces end where the domain ends: an end that only round-off parts from a grid
-    // line continues the hat's straight line.
+    // outermost pieces end where the domain ends: beyond an end that only round-off parts from a
+    // grid line, and beyond the grid's edge, the cell's straight lines go on.
     let offset = centre - span.first as f64;
     let (mut low, mut high) = (offset - reach, offset + reach);
     let per_length = 1.0 / (high - low);
-    let edge = (last + 1) as f64;
-    // Beyond the grid's edge the outer halves of the outermost nodes' hats count on.
-    if span.first == 0 && low < -LINE_TOLERANCE {
-        let share = low.max(-1.0).abs() * per_length;
-        line.weights[0] += share * (1.0 + 0.5 * low.max(-1.0));
-        line.slopes[0] += share / spacing;
-        low = 0.0;
-    }
-    if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
-        let beyond = (high - edge).min(1.0);
-        let share = beyond * per_length;
-        line.weights[last + 1] += share * (1.0 - 0.5 * beyond);
-        line.slopes[last + 1] -= share / spacing;
-        high = edge;
+    if let Some(cells) = published {
+        let edge = (last + 1) as f64;
+        if span.first == 0 && low < -LINE_TOLERANCE {
+            let share = low.max(-1.0).abs() * per_length;
+            line.weights[0] += share * (1.0 + 0.5 * low.max(-1.0));
+            line.slopes[0] += share / spacing;
+            low = 0.0;
+        }
+        if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
+            let beyond = (high - edge).min(1.0);
+            let share = beyond * per_length;
+            line.weights[last + 1] += share * (1.0 - 0.5 * beyond);
+            line.slopes[last + 1] -= share / spacing;
+            high = edge;
+        }
     }
     for cell in 0..=last {
         let start = if cell == 0 { low } else { cell as f64 };

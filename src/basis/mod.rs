@@ -30,7 +30,9 @@ pub mod row;
 
 pub use row::Row;
 
-use crate::deck::model::Basis;
+use rustc_hash::FxHashMap;
+
+use crate::deck::model::{Basis, GimpEdge};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
@@ -56,6 +58,8 @@ pub struct Cells {
     /// End of each row.
     ends: Vec<usize>,
     cells: Vec<usize>,
+    /// Cell of each point whose row was made in a cell of choice.
+    chosen: FxHashMap<usize, usize>,
 }
 
 impl Cells {
@@ -66,6 +70,11 @@ impl Cells {
 
     /// Those of point `p`.
     pub fn of(&self, p: usize) -> Option<&[usize]> {
+        if !self.chosen.is_empty()
+            && let Some(cell) = self.chosen.get(&p)
+        {
+            return Some(std::slice::from_ref(cell));
+        }
         let end = *self.ends.get(p)?;
         let start = if p == 0 { 0 } else { self.ends[p - 1] };
         Some(&self.cells[start..end])
@@ -110,6 +119,20 @@ impl<const D: usize> Influences<D> {
         self.gradients.push(gradient);
     }
 
+    /// Makes row `p` of `mpm` anew, for a point at `x` that lies on a face of `cell`: nodes off that
+    /// face get a weight of exactly zero, and the gradients are the cell's.
+    pub fn replace_row(&mut self, grid: &Grid<D>, p: usize, x: &[f64; D], cell: usize) {
+        let range = self.row(p);
+        mpm::fill_in(grid, x, cell, |a, (node, weight, gradient)| {
+            let at = range.start + a;
+            debug_assert!(at < range.end, "rows of mpm are those of a cell");
+            self.nodes[at] = node;
+            self.weights[at] = weight;
+            self.gradients[at] = gradient;
+        });
+        self.cells.chosen.insert(p, cell);
+    }
+
     /// Ends the row being built.
     #[inline]
     pub fn close_row(&mut self) {
@@ -119,16 +142,26 @@ impl<const D: usize> Influences<D> {
 
 /// Computes the influences of all points for a new step. Error: a point (or a corner of its
 /// domain) outside the grid, named by id and position. A GIMP domain may reach over the grid's
-/// edge: its part beyond finds no nodes and is lost, only its centre must be inside.
+/// edge, where the outer cell's functions go on; only its centre must be inside.
 pub fn map_points<const D: usize>(
     grid: &Grid<D>,
     basis: Basis,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
+    map_points_with(grid, basis, GimpEdge::Continued, points)
+}
+
+/// [`map_points`] with the deck's choice for GIMP domains that reach over the grid's edge.
+pub fn map_points_with<const D: usize>(
+    grid: &Grid<D>,
+    basis: Basis,
+    edge: GimpEdge,
+    points: &Points<D>,
+) -> Result<Influences<D>> {
     let mut hint = None;
     match basis {
         Basis::Mpm => mpm::map_points(grid, points),
-        Basis::Gimp => gimp::map_points(grid, points),
+        Basis::Gimp => gimp::map_points(grid, edge, points),
         Basis::Cpdi1 => row::map_points(points, |p, row| {
             cpdi1::corners(points, p)?.fill(grid, points, p, &mut hint, row)
         }),

@@ -1,9 +1,10 @@
 //! S_v = N_v(x_p): the grid's own shape functions at the point (Ghost §2.5).
 //!
 //! A point on a grid line belongs to the upper cell ([`Grid::locate`]); the row holds all nodes
-//! of its cell, also those with weight zero.
+//! of its cell, also those with weight zero. In explicit analyses, where the mass decides, the
+//! assembly may choose another cell that holds the point ([`Influences::replace_row`]).
 
-use super::{Influences, outside, row};
+use super::{Influences, Row, outside, row};
 use crate::error::Result;
 use crate::grid::locate::REACH;
 use crate::grid::{Grid, Lattice};
@@ -69,6 +70,22 @@ fn map_points_on_mesh<const D: usize>(grid: &Grid<D>, points: &Points<D>) -> Res
         row.merge();
         Ok(())
     })
+}
+
+/// The row of a place `x` in a `cell` that holds it, entry by entry, nodes ascending.
+pub(super) fn fill_in<const D: usize>(
+    grid: &Grid<D>,
+    x: &[f64; D],
+    cell: usize,
+    mut put: impl FnMut(usize, (usize, f64, [f64; D])),
+) {
+    let Some(at) = grid.interpolate_in(cell, x) else { return };
+    let mut row = Row::default();
+    row.add_place(&at);
+    row.merge();
+    for (a, &entry) in row.entries().iter().enumerate() {
+        put(a, entry);
+    }
 }
 
 pub(crate) fn populated_cells<const D: usize>(

@@ -4,8 +4,8 @@
 
 use proptest::prelude::*;
 
-use super::{Groups, Influences, map_points, populated_cells};
-use crate::deck::model::Basis;
+use super::{Groups, Influences, map_points, map_points_with, populated_cells};
+use crate::deck::model::{Basis, GimpEdge};
 use crate::error::Error;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
@@ -226,22 +226,59 @@ fn an_overlap_that_is_no_round_off_counts() {
     check_row_is_cells(Basis::Gimp, &points, 0);
 }
 
-#[test]
-fn the_hats_of_the_edge_go_on_for_a_cell_beyond_it() {
+/// Domains that stick out of the lattice, the sum of their weights where hats of the grid's own
+/// nodes are all there is, and their cells.
+fn sticking_out() -> Vec<([[f64; 2]; 2], f64, usize)> {
     let grid = lattice::<2>();
     // One minus, per axis, the share beyond the edge times its mean distance in cells.
-    for (t, reach, exact, cells) in [
-        ([0.0, 2.5], [0.4, 0.3], 1.0 - 0.5 * 0.2, vec![grid.cell_at([0, 2])]),
-        ([0.1, 2.5], [0.4, 0.3], 1.0 - 0.375 * 0.15, vec![grid.cell_at([0, 2])]),
-        ([7.0, 5.0], [0.25, 0.25], 0.9375 * 0.9375, vec![grid.cell_at([6, 4])]),
-        ([6.9, 2.5], [0.2, 0.5], 1.0 - 0.25 * 0.05, vec![grid.cell_at([6, 2])]),
-    ] {
+    vec![
+        ([[0.0, 2.5], [0.4, 0.3]], 1.0 - 0.5 * 0.2, grid.cell_at([0, 2])),
+        ([[0.1, 2.5], [0.4, 0.3]], 1.0 - 0.375 * 0.15, grid.cell_at([0, 2])),
+        ([[7.0, 5.0], [0.25, 0.25]], 0.9375 * 0.9375, grid.cell_at([6, 4])),
+        ([[6.9, 2.5], [0.2, 0.5]], 1.0 - 0.25 * 0.05, grid.cell_at([6, 2])),
+    ]
+}
+
+/// Partition of unity, and linear fields with their gradient, for domains over the edge.
+#[test]
+fn no_weight_is_lost_beyond_the_edge() {
+    let grid = lattice::<2>();
+    for ([t, reach], _, cell) in sticking_out() {
         let points = points_at::<2>(&[(t, reach)]);
         let influences = map(Basis::Gimp, &points);
+        let mut sum = [0.0; 3];
+        let mut slope = [[0.0; 2]; 3];
+        for entry in influences.row(0) {
+            let x = grid.node_position(influences.nodes[entry]);
+            for (k, field) in [1.0, x[0], x[1]].into_iter().enumerate() {
+                sum[k] += influences.weights[entry] * field;
+                for a in 0..2 {
+                    slope[k][a] += influences.gradients[entry][a] * field;
+                }
+            }
+        }
+        let at = points.position[0];
+        for (k, exact) in [1.0, at[0], at[1]].into_iter().enumerate() {
+            assert!((sum[k] - exact).abs() < 1e-13, "{t:?}: {sum:?}");
+            for a in 0..2 {
+                let exact = if k == a + 1 { 1.0 } else { 0.0 };
+                assert!((slope[k][a] - exact).abs() < 1e-12, "{t:?}: {slope:?}");
+            }
+        }
+        assert_eq!(cells_of(Basis::Gimp, &points, 0), [cell]);
+        check_row_is_cells(Basis::Gimp, &points, 0);
+    }
+}
+
+#[test]
+fn published_hats_of_the_edge_go_on_for_a_cell_beyond_it() {
+    for ([t, reach], exact, _) in sticking_out() {
+        let points = points_at::<2>(&[(t, reach)]);
+        let grid = Grid::Lattice(lattice());
+        let influences = map_points_with(&grid, Basis::Gimp, GimpEdge::Published, &points)
+            .expect("the centre is inside");
         let sum: f64 = influences.weights.iter().sum();
         assert!((sum - exact).abs() < 1e-12, "{t:?}: {sum}");
-        assert_eq!(cells_of(Basis::Gimp, &points, 0), cells);
-        check_row_is_cells(Basis::Gimp, &points, 0);
     }
 }
 

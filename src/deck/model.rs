@@ -91,6 +91,7 @@ pub enum InvertedIterates {
 pub struct Method {
     pub basis: Basis,
     pub domain_update: DomainUpdate,
+    pub gimp_edge: GimpEdge,
     pub point_volume: PointVolume,
     pub frame: Frame,
     pub mass: Mass,
@@ -153,6 +154,15 @@ pub enum StressUpdate {
     Usf,
     Usl,
     Musl,
+}
+
+/// Functions of a GIMP domain that sticks out of the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GimpEdge {
+    /// Those of the outer cell go on: their sum stays one.
+    Continued,
+    /// Hats of the grid's own nodes alone: what a node beyond the edge would hold is lost.
+    Published,
 }
 
 /// What moves the points of an explicit step with a Ghost mass.

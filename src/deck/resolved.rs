@@ -118,6 +118,7 @@ fn analysis(w: &mut Writer, deck: &Deck) {
     w.table("[method]");
     w.line("method", "basis", quote(m.basis.name()));
     w.line("method", "domain_update", quote(m.domain_update.name()));
+    w.line("method", "gimp_edge", quote(m.gimp_edge.name()));
     w.line("method", "point_volume", quote(m.point_volume.name()));
     // What `control = "fem"` stands for is written out in grid.motion and body.gauss.
     w.line("method", "control", quote("off"));

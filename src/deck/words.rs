@@ -1,7 +1,7 @@
 //! The deck's own words for the enumerations of the model.
 
 use super::model::{
-    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
     InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, VerifyNorm,
 };
 
@@ -48,6 +48,7 @@ words! {
         "normal-corrected" => NormalCorrected,
         "normal-incremental" => NormalIncremental,
     }
+    GimpEdge { "continued" => Continued, "published" => Published }
     PointVolume { "deformation" => Deformation, "domain" => Domain }
     Frame { "previous" => Previous, "updated" => Updated, "total" => Total }
     Mass { "consistent" => Consistent, "lumped" => Lumped }

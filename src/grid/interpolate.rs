@@ -1,8 +1,8 @@
 //! The grid's own basis S_i(x) and its gradient at a place, on either grid (Ghost §2.5).
 
 use super::element;
-use super::inverse_map::inverse_map_from;
-use super::lattice::CELL_CORNERS;
+use super::inverse_map::{inverse_map, inverse_map_from};
+use super::lattice::{CELL_CORNERS, LINE_TOLERANCE};
 use super::locate::{EDGE_TOLERANCE, REACH};
 use super::{Grid, Lattice, Mesh};
 
@@ -40,7 +40,8 @@ impl<const D: usize> Grid<D> {
     ) -> Option<Interpolation<D>> {
         match self {
             Grid::Lattice(lattice) => {
-                Some(basis_on_lattice(lattice, lattice_cell(lattice, x, allowance)?, x))
+                let low = lattice_cell(lattice, x, allowance)?;
+                Some(basis_on_lattice(lattice, low, &within(lattice, low, x)))
             }
             Grid::Mesh(mesh) => {
                 let (cell, xi) = mesh.locate_near(x, allowance, hint)?;
@@ -52,9 +53,50 @@ impl<const D: usize> Grid<D> {
         }
     }
 
+    /// The basis at `x` in a `cell` that holds it, on its rim at most up to the round-off by which
+    /// [`Self::cells_at`] takes a place to lie on a face: that is removed, so that the functions of
+    /// nodes off the face are exactly zero on a lattice, and nowhere below zero. `None` for a cell
+    /// of a mesh without volume.
+    pub fn interpolate_in(&self, cell: usize, x: &[f64; D]) -> Option<Interpolation<D>> {
+        match self {
+            Grid::Lattice(lattice) => {
+                let low = lattice.cell_index(cell);
+                Some(basis_on_lattice(lattice, low, &on_lines(within(lattice, low, x))))
+            }
+            Grid::Mesh(mesh) => {
+                let positions = mesh.cell_positions(cell);
+                let nodes = &positions[..mesh.element.node_count()];
+                let xi = on_faces(mesh.element, inverse_map(mesh.element, nodes, x)?);
+                let (gradients, _) = element::gradients(mesh.element, nodes, &xi)?;
+                Some(Interpolation { values: values_on_mesh(mesh, cell, &xi), gradients })
+            }
+        }
+    }
+
+    /// Appends all cells that hold `x`: several where it lies on a face, an edge or a node, up to
+    /// round-off. The one that [`Self::locate`] names comes first, the others in a fixed order.
+    pub fn cells_at(&self, x: &[f64; D], out: &mut Vec<usize>) {
+        match self {
+            Grid::Lattice(lattice) => {
+                let Some(upper) = lattice.cell_of(x) else { return };
+                let on_line: [bool; D] = std::array::from_fn(|a| {
+                    let t = lattice.scaled(a, x[a]);
+                    upper[a] > 0 && (t - upper[a] as f64).abs() <= LINE_TOLERANCE
+                });
+                for lower in 0..1usize << D {
+                    let down = |a: usize| lower >> a & 1;
+                    if (0..D).all(|a| down(a) == 0 || on_line[a]) {
+                        out.push(lattice.cell_at(std::array::from_fn(|a| upper[a] - down(a))));
+                    }
+                }
+            }
+            Grid::Mesh(mesh) => mesh.cells_holding(x, out),
+        }
+    }
+
     /// The values of [`Self::interpolate`] for a place on the rim of a region about `centre`: on a
-    /// face of the grid the cell on the side of `centre` is taken, so that a region which fills its
-    /// cells does not reach into those it merely touches.
+    /// face of the grid, up to round-off, the cell on the side of `centre` is taken, so that a
+    /// region which fills its cells does not reach into those it merely touches.
     pub fn values_towards(
         &self,
         x: &[f64; D],
@@ -62,24 +104,49 @@ impl<const D: usize> Grid<D> {
         allowance: f64,
         hint: Option<usize>,
     ) -> Option<Values> {
-        const NUDGE: f64 = 1e-6;
-        let inner = std::array::from_fn(|a| x[a] + NUDGE * (centre[a] - x[a]));
         match self {
             Grid::Lattice(lattice) => {
-                // The place itself must be within reach, too.
-                lattice_cell(lattice, x, allowance)?;
-                let cell = lattice_cell(lattice, &inner, allowance)?;
-                Some(values_on_lattice(lattice, cell, &within(lattice, cell, x)))
+                let mut low = lattice_cell(lattice, x, allowance)?;
+                for a in 0..D {
+                    let t = lattice.scaled(a, x[a]);
+                    let line = t.round();
+                    if (t - line).abs() <= LINE_TOLERANCE {
+                        let below = line > 0.0 && lattice.scaled(a, centre[a]) < line;
+                        low[a] = (line as usize - usize::from(below)).min(lattice.cells[a] - 1);
+                    }
+                }
+                Some(values_on_lattice(lattice, low, &on_lines(within(lattice, low, x))))
             }
             Grid::Mesh(mesh) => {
+                const NUDGE: f64 = 1e-6;
+                let inner = std::array::from_fn(|a| x[a] + NUDGE * (centre[a] - x[a]));
                 let (cell, near) = mesh.locate_near(&inner, allowance, hint)?;
                 let positions = mesh.cell_positions(cell);
                 let nodes = &positions[..mesh.element.node_count()];
                 let xi = inverse_map_from(mesh.element, nodes, x, near)?;
-                Some(values_on_mesh(mesh, cell, &xi))
+                if mesh.element.outside(&xi) > EDGE_TOLERANCE
+                    && let Some((own, xi)) = mesh.locate_near(x, 0.0, Some(cell))
+                {
+                    // The nudge has brought it over a face that it is truly beyond.
+                    return Some(values_on_mesh(mesh, own, &on_faces(mesh.element, xi)));
+                }
+                Some(values_on_mesh(mesh, cell, &on_faces(mesh.element, xi)))
             }
         }
     }
+}
+
+/// Coordinates within a cell of a lattice, those next to a face put onto it.
+fn on_lines<const D: usize>(local: [f64; D]) -> [f64; D] {
+    local.map(|t| if (t - t.round()).abs() <= LINE_TOLERANCE { t.round() } else { t })
+}
+
+/// Reference coordinates, those of a box next to a face put onto it.
+fn on_faces<const D: usize>(element: element::Element, xi: [f64; D]) -> [f64; D] {
+    if element.is_simplex() {
+        return xi;
+    }
+    xi.map(|xi| if (xi.abs() - 1.0).abs() <= 2.0 * EDGE_TOLERANCE { xi.signum() } else { xi })
 }
 
 /// Index of the cell that holds `x`, or of the outer one within reach.
@@ -104,9 +171,8 @@ fn lattice_cell<const D: usize>(
 fn basis_on_lattice<const D: usize>(
     lattice: &Lattice<D>,
     low: [usize; D],
-    x: &[f64; D],
+    local: &[f64; D],
 ) -> Interpolation<D> {
-    let local = within(lattice, low, x);
     let mut gradients = [[0.0; D]; 8];
     for (gradient, corner) in gradients.iter_mut().zip(&CELL_CORNERS).take(1 << D) {
         *gradient = std::array::from_fn(|axis| {
@@ -115,7 +181,7 @@ fn basis_on_lattice<const D: usize>(
             slope * others.product::<f64>() / lattice.spacing[axis]
         });
     }
-    Interpolation { values: values_on_lattice(lattice, low, &local), gradients }
+    Interpolation { values: values_on_lattice(lattice, low, local), gradients }
 }
 
 /// `x` in units of the cell with index `low`, from its lower corner.

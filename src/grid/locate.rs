@@ -176,6 +176,17 @@ impl<const D: usize> Mesh<D> {
         self.nearest(x, allowance)
     }
 
+    /// Appends the cells that hold `x`, ascending, the first that [`Self::locate`] names.
+    pub(super) fn cells_holding(&self, x: &[f64; D], out: &mut Vec<usize>) {
+        if self.folded {
+            out.extend(self.locate(x));
+            return;
+        }
+        out.extend(self.bins.candidates(x).iter().map(|&cell| cell as usize).filter(|&cell| {
+            self.reference_of(cell, x, 0.0).is_some_and(|(_, outside)| outside <= EDGE_TOLERANCE)
+        }));
+    }
+
     /// From `cell` across the face that `x` is furthest beyond, again and again. A cell counts
     /// only if it holds `x` well inside: then no other does.
     fn walk(&self, mut cell: usize, x: &[f64; D]) -> Option<(usize, [f64; D])> {

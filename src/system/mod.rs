@@ -17,10 +17,12 @@
 //! | `in_place.rs` | those rows in the solver's own memory |
 //! | `held.rs` | held degrees of freedom in those rows |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
+//! | `face_points.rs` | the cells of points on faces, where the mass decides |
 //! | `terms/` | contributions to the equations |
 
 pub mod border;
 pub mod conditions;
+pub mod face_points;
 pub mod graph;
 pub mod held;
 pub mod in_place;

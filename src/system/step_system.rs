@@ -2,6 +2,7 @@
 
 use super::border::Border;
 use super::conditions::{Conditions, StepSpan};
+use super::face_points;
 use super::numbering::Numbering;
 use super::numbering::Touched;
 use super::pattern::{self, Pattern};
@@ -146,7 +147,13 @@ impl<const D: usize> Discretisation<D> {
     ) -> Result<Self> {
         let (grid, partition) = (&model.grid, &model.partition);
         let basis = model.deck.method.basis;
-        let influences = world.fail_together(basis::map_points(grid, basis, points))?;
+        let mut influences = {
+            let edge = model.deck.method.gimp_edge;
+            world.fail_together(basis::map_points_with(grid, basis, edge, points))?
+        };
+        if basis == Basis::Mpm && coupling != Coupling::Matrix {
+            face_points::settle(world, grid, partition, points, &mut influences)?;
+        }
         let groups = Groups::new(&influences);
         let populated = Populated::find(world, grid, partition, basis, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {

@@ -8,7 +8,7 @@ use super::Need::{Default, Optional, Required};
 use super::{POSITIVE, Section, at_least, between, key};
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
-    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, Initial,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
     InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, VerifyNorm,
 };
 
@@ -82,6 +82,8 @@ pub const SECTIONS: &[Section] = &[
                 "fem: the same deck by updated-Lagrangian finite elements, as a control: Gauss points for points_per_cell, basis mpm, a mesh that follows the material."),
             key("domain_update", Choice(DomainUpdate::NAMES), Default("\"corners\""),
                 "How GIMP domains follow the deformation (Lagrangian eq. 32-39)."),
+            key("gimp_edge", Choice(GimpEdge::NAMES), Default("\"continued\""),
+                "Functions of a GIMP domain that sticks out of the grid. continued: those of the grid's outer cell go on, so that no weight is lost. published: hats of the grid's own nodes, which lose the share of a node beyond the edge (the papers' tables)."),
             key("point_volume", Choice(PointVolume::NAMES), Default("\"deformation\""),
                 "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none)."),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),

@@ -103,6 +103,7 @@ pub fn method(
 ) -> Got<Method> {
     let basis: Got<Basis> = table.choice("basis");
     let domain_update = table.choice("domain_update");
+    let gimp_edge = table.choice("gimp_edge");
     let point_volume = table.choice("point_volume");
     let frame = table.choice("frame");
     let mass = table.choice("mass");
@@ -146,6 +147,7 @@ pub fn method(
     Ok(Method {
         basis,
         domain_update: domain_update?,
+        gimp_edge: gimp_edge?,
         point_volume,
         frame: frame?,
         mass,
