@@ -1,12 +1,15 @@
 # Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
-.PHONY: help setup build run test bench iterations scaling compare docs validate lint clean
+.PHONY: help setup build run install test bench iterations scaling compare docs validate lint clean
 
 RANKS ?= 2
 DECK  ?= inputs/beam.toml
 ARGS  ?=
+PREFIX ?= /usr/local
+PROGRAM ?= target/release/mpm-par
 
 help:
 	@echo "make run       install what is missing, build, run $(DECK) on $(RANKS) ranks"
+	@echo "make install   build, and copy mpm-par to $(PREFIX)/bin (PREFIX=...)"
 	@echo "make test      all tests"
 	@echo "make lint      format and clippy, warnings are errors"
 	@echo "make bench     time the parts of a step beside the machine's limits"
@@ -27,6 +30,12 @@ build: setup
 # --force: the same command may be given twice.
 run: build
 	@sh jobs/mpirun.sh $(RANKS) target/release/mpm-par $(DECK) --force $(ARGS)
+
+install: build
+	@install -D -m 755 $(PROGRAM) $(DESTDIR)$(PREFIX)/bin/mpm-par
+	@echo "installed $(DESTDIR)$(PREFIX)/bin/mpm-par"
+	@case ":$$PATH:" in *":$(PREFIX)/bin:"*) ;; \
+		*) echo "$(PREFIX)/bin is not on the PATH: export PATH=$(PREFIX)/bin:\$$PATH" ;; esac
 
 test: setup
 	cargo test --release

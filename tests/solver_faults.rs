@@ -263,3 +263,20 @@ fn a_residual_at_round_off_is_told_to_raise_the_tolerance() {
         }
     }
 }
+
+/// The generic kernel of OpenBLAS is told, any other is not; nothing is said of another BLAS.
+#[test]
+fn a_generic_blas_is_told() {
+    let program = env!("CARGO_BIN_EXE_mpm-par");
+    let libraries = std::process::Command::new("ldd").arg(program).output().expect("ldd");
+    let is_openblas = String::from_utf8_lossy(&libraries.stdout).contains("openblas");
+    println!("the BLAS here is {}OpenBLAS", if is_openblas { "" } else { "not " });
+    let said = |kernel: &str| {
+        let run = block().set("ghost=").set("analysis.steps=1").env("OPENBLAS_CORETYPE", kernel);
+        let outcome = run.attempt();
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        outcome.stdout.contains("note: OpenBLAS runs its generic kernel (Prescott)")
+    };
+    assert_eq!(said("Prescott"), is_openblas);
+    assert!(!said("Nehalem"));
+}

@@ -17,6 +17,7 @@
 //! | `stored.rs` | [`Stored`]: single or double precision |
 //! | `block_product.rs` | [`BlockProduct`]: a rank's rows of such a matrix, and PETSc's shell over them |
 //! | `hierarchy.rs` | [`Hierarchy`]: multigrid's cycle on levels of such matrices |
+//! | `blas.rs` | the kernel that OpenBLAS runs |
 //! | `object.rs` | handles given back when they go out of scope |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
 //! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
@@ -27,6 +28,7 @@
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
 mod abort;
+pub mod blas;
 mod block_product;
 mod blocks;
 mod check;

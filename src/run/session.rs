@@ -79,6 +79,9 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
         ranks: world.size(),
         libraries: versions.clone().into_iter().collect(),
     }));
+    if let Some(note) = petsc::blas::note() {
+        log.say(&note);
+    }
     let run = Run { world, session: &session, arguments, text, versions, log };
     match deck.dimension {
         2 => run.in_space::<2>(deck),

@@ -2,14 +2,22 @@
 //! the vector instructions of the function it lands in. Such a function exists twice, with
 //! `FUSED` for processors that round a b + c once.
 
+#[cfg(target_arch = "x86_64")]
+use std::sync::OnceLock;
+
 /// `R` x `C` values, row first.
 pub type Block<const R: usize, const C: usize> = [[f64; C]; R];
 
-/// Whether the forms for AVX2 and fused multiply-add can run here.
+/// Whether the forms for AVX2 and fused multiply-add can run here. The environment variable
+/// `MPM_PAR_AVX2=off` says no, to see what round-off decides.
 #[cfg(target_arch = "x86_64")]
 #[inline]
 pub fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+    static HAS: OnceLock<bool> = OnceLock::new();
+    *HAS.get_or_init(|| {
+        let wanted = std::env::var_os("MPM_PAR_AVX2").is_none_or(|word| word != "off");
+        wanted && is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+    })
 }
 
 /// a b + c, rounded once where the instruction set can.

@@ -80,15 +80,15 @@ const TABLE_7: [Row7; 6] = [
 ];
 
 /// The height with `corners` hangs on which small overlaps count, and so on round-off: it is about
-/// `by_corners`, found from 6.219 to 6.253 with the volumes of the domains and from 6.252 to 6.316
-/// with det F V0.
+/// `by_corners`, found from 6.187 to 6.268 with the volumes of the domains and from 6.252 to 6.316
+/// with det F V0. The extent, printed 13.769, is found from 13.76843 to 13.76852.
 #[track_caller]
 fn assert_printed(update: &str, values: [f64; 2], printed: [&str; 2], by_corners: f64) {
-    assert_prints(values[0], printed[0]);
     if update == "corners" {
         assert!((values[0] - 13.7685).abs() < 1e-3, "{values:?}");
-        assert!((values[1] - by_corners).abs() < 0.05, "{values:?}");
+        assert!((values[1] - by_corners).abs() < 0.08, "{values:?}");
     } else {
+        assert_prints(values[0], printed[0]);
         assert_prints(values[1], printed[1]);
     }
 }
