@@ -25,7 +25,7 @@ const NOT_RUN: &[(&str, &str)] = &[
     ("LIMIT=3600 bash jobs/chain.sbatch", "needs a long run: tests/jobs.rs"),
 ];
 /// Pages whose decks are run to their end; those of other pages are checked.
-const RUN_DECKS_OF: [&str; 2] = ["README.md", "docs/deck.md"];
+const RUN_DECKS_OF: [&str; 2] = ["README.md", "docs/guide/deck.md"];
 
 struct Block {
     /// `README.md:41`
@@ -39,12 +39,20 @@ fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
 
-/// README.md and docs/*.md: (name from the root, text).
+/// README.md and the pages of docs/ but for its log: (name from the root, text).
 fn pages() -> Vec<(String, String)> {
     let mut paths = vec![root().join("README.md")];
-    let docs = std::fs::read_dir(root().join("docs")).expect("docs/ is there");
-    let pages = docs.map(|entry| entry.expect("docs/ can be listed").path());
-    paths.extend(pages.filter(|path| path.extension().is_some_and(|end| end == "md")));
+    let mut folders = vec![root().join("docs")];
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder of docs/ can be listed") {
+            let path = entry.expect("a folder of docs/ can be listed").path();
+            if path.is_dir() && !path.ends_with("log") {
+                folders.push(path);
+            } else if path.extension().is_some_and(|end| end == "md") {
+                paths.push(path);
+            }
+        }
+    }
     paths.sort();
     let read = |path: PathBuf| {
         let name = path.strip_prefix(root()).expect("below the root").display().to_string();
@@ -274,6 +282,18 @@ fn decks_named_in_the_pages_take_the_printed_settings() {
         }
     }
     assert!(found >= 8, "{found} commands with a deck");
+}
+
+#[test]
+fn links_between_the_pages_lead_somewhere() {
+    for (page, text) in pages() {
+        let folder = root().join(&page).parent().expect("a folder").to_path_buf();
+        for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
+            let path = link.split('#').next().unwrap_or_default();
+            let elsewhere = path.is_empty() || path.contains("://") || path.contains('\n');
+            assert!(elsewhere || folder.join(path).exists(), "{page}: no {link}");
+        }
+    }
 }
 
 #[test]
