@@ -1,6 +1,6 @@
 //! Explicit dynamics over all time steps (Ghost §2.3): what a run checks, records and leaves.
 
-use crate::deck::model::Mass;
+use crate::deck::model::{Basis, DomainUpdate, Mass};
 use crate::error::{Error, Result};
 use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
@@ -95,6 +95,22 @@ pub fn run<const D: usize>(
                 unstabilised(model)
             ))));
         }
+        if entry.overgrown > 0.0 {
+            recorder.log.warn_of_step(
+                number,
+                "GIMP domains had grown to more than twice what their points are stretched by, and \
+                 were put back to the stretch: method.domain_update = \"corners\" follows nodes that \
+                 hardly hold mass; \"stretch\" or a consistent mass does not",
+                &format!("({} domains)", entry.overgrown),
+            );
+        }
+        if let Some(share) = ledger.gain(&entry) {
+            recorder.log.warn_of_step(
+                number,
+                &gaining(model),
+                &format!("({:.1} %)", 100.0 * share),
+            );
+        }
         steps.accept(span);
         recorder.steps_completed = number;
         recorder.linear.add(row.linear_iterations);
@@ -113,6 +129,25 @@ pub fn run<const D: usize>(
         }
     }
     Ok(Ending::completed())
+}
+
+/// Where energy that no work brought in may come from.
+fn gaining<const D: usize>(model: &Model<D>) -> String {
+    let method = &model.deck.method;
+    let cause = match (method.mass, method.basis, method.domain_update) {
+        (Mass::Lumped, Basis::Gimp, DomainUpdate::Corners) => {
+            "GIMP domains that follow nodes of little mass (domain_update = \"stretch\" does not)"
+        }
+        (Mass::Consistent, ..) => {
+            "points that cross cells under large deformation with the FLIP share of velocity_update \
+             (a number below 1 damps it), or the time step"
+        }
+        _ => "points that cross cells (a basis with domains is smoother), or the time step",
+    };
+    format!(
+        "the energy has grown by more than 5 % of what was there or brought in, without work done \
+         on the bodies; likely: {cause}"
+    )
 }
 
 /// What makes a consistent mass without Ghost share unstable is not the time step.

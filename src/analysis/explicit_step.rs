@@ -97,7 +97,7 @@ pub(crate) fn advance<const D: usize>(
     let ghost = mass.ghost_energy(&mesh, &velocity);
     let linear_iterations = nodes.inverse.iterations();
     clock.add(Phase::Solve, nodes.seconds);
-    let energies = clock.time(Phase::Update, || {
+    let (energies, overgrown) = clock.time(Phase::Update, || {
         if !usf {
             update::stretch(&made.deformation, points, Some(before));
         }
@@ -111,14 +111,14 @@ pub(crate) fn advance<const D: usize>(
             points,
             Some(before),
         );
-        world.fail_together(followed)?;
+        let overgrown = world.fail_together(followed)?;
         let energies = energies.unwrap_or_else(|| {
             update::respond(&model.materials, &made.deformation, points, Some(before))
         });
         update::move_points(&made.displacement, points, Some(before));
         before.velocity.replace(&mut points.velocity, new_velocity);
         before.acceleration.replace(&mut points.acceleration, rate);
-        Ok(energies)
+        Ok((energies, overgrown))
     })?;
 
     let reaction = at_held(&conditions, &residual);
@@ -131,7 +131,7 @@ pub(crate) fn advance<const D: usize>(
         ..mesh.row(world, points)
     };
     let driven = mass.driven_energy(&mesh, &conditions.increment, dt);
-    let sums = StepSums { energies, ghost, work, driven };
+    let sums = StepSums { energies, ghost, work, driven, overgrown };
     Ok((Solved { row, mesh, displacement, reaction, moved_grid: None }, sums))
 }
 

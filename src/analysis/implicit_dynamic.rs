@@ -283,7 +283,7 @@ fn solve_step<const D: usize>(
     })?;
 
     let driven = mass.driven_energy(&mesh, &conditions.increment, newmark.dt);
-    let sums = StepSums { energies, ghost, work, driven };
+    let sums = StepSums { energies, ghost, work, driven, overgrown: 0 };
     let reaction = at_held(&conditions, &supplied);
     let row = HistoryRow {
         step: number,

@@ -32,6 +32,8 @@ use crate::tensor::spectral::square_root;
 /// `increments` holds dF, one for each point (only read, and else may be empty, for
 /// `normal-incremental`), `displacement` gives the step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
 /// point's own row of [`map_points`](super::map_points) (read for `corners`).
+/// Returns how many domains of `corners` had outgrown the stretch of their points, which are put
+/// back to it.
 ///
 /// Errors: a half length that is zero or not finite, and det F <= 0 where its root is needed,
 /// with the point's id and position.
@@ -42,7 +44,8 @@ pub fn update_domains<const D: usize>(
     points: &mut Points<D>,
     increments: &[Matrix3<f64>],
     displacement: &dyn Fn(usize) -> [f64; D],
-) -> Result<()> {
+) -> Result<usize> {
+    let mut overgrown = 0;
     if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
         for p in 0..points.len() {
             let corners = match basis {
@@ -51,7 +54,7 @@ pub fn update_domains<const D: usize>(
             };
             points.half_length[p] = half_extent(&corners);
         }
-        return Ok(());
+        return Ok(overgrown);
     }
     if rule == DomainUpdate::NormalIncremental && basis == Basis::Gimp {
         assert_eq!(increments.len(), points.len(), "one increment for each point");
@@ -82,7 +85,16 @@ pub fn update_domains<const D: usize>(
             }
             (_, DomainUpdate::Corners) => {
                 let lengths = extent_of_moved_sides(grid, points, p, displacement)?;
-                with_product(lengths, gradient.determinant() * product(initial))
+                let volume = gradient.determinant() * product(initial);
+                let lengths = with_product(lengths, volume);
+                let of_stretch = extent_of_stretched_sides(initial, gradient);
+                if lengths.iter().zip(&longest(&of_stretch)).any(|(l, most)| *l > OVERGROWN * most)
+                {
+                    overgrown += 1;
+                    with_product(of_stretch, volume)
+                } else {
+                    lengths
+                }
             }
         };
         if !new.iter().all(|l| *l > 0.0 && l.is_finite()) {
@@ -91,8 +103,27 @@ pub fn update_domains<const D: usize>(
         }
         points.half_length[p] = new;
     }
-    Ok(())
+    Ok(overgrown)
 }
+
+/// Half the extent of the side centres where F takes those of the initial domain: what the rule
+/// `corners` follows in steps, in one step from the start.
+fn extent_of_stretched_sides<const D: usize>(
+    initial: &[f64; D],
+    gradient: &Matrix3<f64>,
+) -> [f64; D] {
+    std::array::from_fn(|i| (0..D).map(|j| gradient[(i, j)].abs() * initial[j]).fold(0.0, f64::max))
+}
+
+/// The longest of `lengths` on every axis: a domain that has turned may have exchanged them.
+fn longest<const D: usize>(lengths: &[f64; D]) -> [f64; D] {
+    [lengths.iter().copied().fold(0.0, f64::max); D]
+}
+
+/// A domain is put back to the stretch of its point where it has grown to more than this multiple of
+/// it: displacements of nodes with hardly any mass move its corners, and the next step's functions
+/// reach further to such nodes. A turn alone makes 3^(1/2) at most.
+const OVERGROWN: f64 = 2.0;
 
 fn scaled_by_diagonal<const D: usize>(lengths: &[f64; D], tensor: &Matrix3<f64>) -> [f64; D] {
     std::array::from_fn(|i| lengths[i] * tensor[(i, i)].abs())

@@ -330,7 +330,7 @@ pub fn respond<const D: usize>(
 
 /// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
 /// those of the step's start. `displacement` is the one that made the increments, which
-/// [`unsound_domain`] has passed.
+/// [`unsound_domain`] has passed. Returns how many domains had grown far beyond the stretch.
 #[allow(clippy::too_many_arguments)]
 pub fn follow<const D: usize>(
     grid: &Grid<D>,
@@ -341,7 +341,7 @@ pub fn follow<const D: usize>(
     increments: &Increments<D>,
     points: &mut Points<D>,
     before: Option<&mut Snapshot<D>>,
-) -> Result<()> {
+) -> Result<usize> {
     if let Some(before) = before {
         before.half_length.copy(&points.half_length);
         if basis == Basis::Cpdi2 {

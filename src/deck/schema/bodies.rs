@@ -47,7 +47,7 @@ pub const SECTIONS: &[Section] = &[
                 "Gauss points per axis and cell: updated-Lagrangian finite elements, with basis = \"mpm\" and motion = { follow = \"material\" }.")
                 .range(between(1.0, 8.0)),
             key("velocity", Expressions("X Y Z"), Optional("zeros, or those of the file of points"),
-                "Initial velocity.")
+                "Initial velocity. An explicit run takes it half a time step before the start, as leapfrog does: a body in free fall is g dt t / 2 further at the time t than one that has it at t = 0 (subtract a dt / 2, a the first acceleration, for the velocity at t = 0).")
                 .unit("m/s"),
         ],
     },
