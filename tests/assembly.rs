@@ -210,12 +210,13 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
         max_evaluations: 10,
         frame,
         inverted: deck.analysis.inverted_iterates,
+        symmetric: true,
     };
     let external = vec![0.0; owned];
     let grid = &model.grid;
     let mut problem =
         Equilibrium::new(world, grid, &mesh, step, &conditions, &left_out, external, settings)?;
-    let mut matrix = solver::matrix(world, &model.grid, numbering, pattern)?;
+    let mut matrix = solver::matrix(world, &model, numbering, pattern)?;
     let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);
     x.values_mut()?.copy_from_slice(&probe[..owned]);
     let iterate = &displacement[..owned];

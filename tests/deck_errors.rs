@@ -49,7 +49,7 @@ beam.toml:6:1: analysis.tolerence: unknown key \"tolerence\"
    | ^^^^^^^^^
    = did you mean \"tolerance\"?
    = known keys of [analysis]: type, steps, duration, cfl, tolerance, max_iterations, on_failure, \
-smallest_step, inverted_iterates, newmark_beta, newmark_gamma, hht_alpha"
+smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha"
     );
 }
 

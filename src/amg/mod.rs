@@ -11,6 +11,10 @@
 //! | whose nodes they are | `owners.rs` |
 //! | coarse operator | `galerkin.rs` |
 //! | nodes and rows of a level | `level.rs` |
+//! | symmetric part of an unsymmetric system | `symmetric_part.rs` |
+//!
+//! The levels are those of a symmetric matrix. Under an unsymmetric A they are made from
+//! (A + A^T) / 2, and the iteration outside multiplies by A.
 //!
 //! Whole blocks of a node are the unit throughout, each rank works on its own rows, and nothing
 //! depends on how nodes are dealt out to ranks but the order of sums: iterations are the same on
@@ -24,8 +28,10 @@ pub mod prolongator;
 pub mod rigid;
 pub mod spectrum;
 pub mod strength;
+pub mod symmetric_part;
 
 use level::{Assembled, Nodes, Rows};
+use symmetric_part::symmetric_part;
 
 use crate::error::Result;
 use crate::grid::Grid;
@@ -60,12 +66,14 @@ struct Coarsening {
 const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
 const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
-/// The hierarchy under an assembled system of displacements. Collective.
+/// The hierarchy under an assembled system of displacements, which may be `symmetric` or not.
+/// Collective.
 pub fn of_system<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     numbering: &Numbering,
     rows: &Assembled,
+    symmetric: bool,
 ) -> Result<Option<Hierarchy>> {
     let nodes = Nodes {
         owned: numbering.owned,
@@ -74,9 +82,11 @@ pub fn of_system<const D: usize>(
         position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
         key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
     };
-    match D {
-        2 => build::<2, 3>(world, &nodes, rows),
-        _ => build::<3, 6>(world, &nodes, rows),
+    match (D, symmetric) {
+        (2, true) => build::<2, 3>(world, &nodes, rows),
+        (2, false) => build_unsymmetric::<2, 3>(world, &nodes, rows),
+        (_, true) => build::<3, 6>(world, &nodes, rows),
+        (_, false) => build_unsymmetric::<3, 6>(world, &nodes, rows),
     }
 }
 
@@ -92,8 +102,8 @@ fn key(node: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64 + f64::MIN_POSITIVE
 }
 
-/// The hierarchy under the matrix `rows` of `K` displacements per node; `C`: rigid-body modes, 3 in
-/// the plane and 6 in space. `None` where no node is coupled to another. Collective.
+/// The hierarchy under the symmetric matrix `rows` of `K` displacements per node; `C`: rigid-body
+/// modes, 3 in the plane and 6 in space. `None` where no node is coupled to another. Collective.
 pub fn build<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,
@@ -104,6 +114,31 @@ pub fn build<const K: usize, const C: usize>(
     fill(rows, &mut exact);
     let mut rounded = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count);
     exact.round_into(&mut rounded);
+    levels::<K, C>(world, nodes, rows, exact, rounded)
+}
+
+/// As [`build`], under a matrix that need not be symmetric but has a symmetric pattern. Collective.
+pub fn build_unsymmetric<const K: usize, const C: usize>(
+    world: &World,
+    nodes: &Nodes,
+    rows: &impl Rows<K>,
+) -> Result<Option<Hierarchy>> {
+    let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
+    let mut exact = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
+    fill(rows, &mut exact);
+    let symmetric = symmetric_part(world, nodes.owned, &nodes.global, &nodes.halo, rows)?;
+    let rounded = product(nodes, &symmetric);
+    levels::<K, C>(world, nodes, &symmetric, exact, rounded)
+}
+
+/// The hierarchy with `exact` outside and the symmetric `rows`, rounded, on the finest level.
+fn levels<const K: usize, const C: usize>(
+    world: &World,
+    nodes: &Nodes,
+    rows: &impl Rows<K>,
+    exact: BlockProduct<f64>,
+    rounded: BlockProduct<f32>,
+) -> Result<Option<Hierarchy>> {
     let mut levels = Vec::new();
     let first = coarsen::<K, C>(world, nodes, rows, rounded, 1.0, FINEST)?;
     let Some((level, mut coarse, mut length)) = first else { return Ok(None) };

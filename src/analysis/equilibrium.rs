@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use crate::amg;
 use crate::amg::level::Assembled;
+use crate::amg::symmetric_part::symmetric_part;
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -37,6 +38,8 @@ pub struct NewtonSettings {
     pub max_evaluations: usize,
     pub frame: Frame,
     pub inverted: InvertedIterates,
+    /// The tangent equals its transposed.
+    pub symmetric: bool,
 }
 
 /// One step's equations. Vectors named `*_owned` hold the owned degrees of freedom, the others
@@ -472,12 +475,27 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
-        self.with_rows(matrix, |rows| amg::of_system(self.world, self.grid, self.numbering, rows))
+        self.with_rows(matrix, |rows| {
+            let symmetric = self.settings.symmetric;
+            amg::of_system(self.world, self.grid, self.numbering, rows, symmetric)
+        })
     }
 
-    fn fill(&mut self, matrix: &mut Matrix, exact: &mut BlockProduct<f64>) -> Result<()> {
+    fn fill(
+        &mut self,
+        matrix: &mut Matrix,
+        exact: &mut BlockProduct<f64>,
+        finest: &mut BlockProduct<f32>,
+    ) -> Result<()> {
         self.with_rows(matrix, |rows| {
             amg::fill::<_, D>(rows, exact);
+            if self.settings.symmetric {
+                exact.round_into(finest);
+                return Ok(());
+            }
+            let (world, of) = (self.world, self.numbering);
+            let part = symmetric_part(world, of.owned, &of.global, &of.halo, rows)?;
+            amg::fill::<_, D>(&part, finest);
             Ok(())
         })
     }

@@ -43,6 +43,7 @@ pub fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
         max_evaluations: deck.analysis.max_iterations,
         frame: deck.method.frame,
         inverted: deck.analysis.inverted_iterates,
+        symmetric: model.symmetric(),
     }
 }
 
@@ -61,8 +62,8 @@ pub fn solve<const D: usize>(
     number: usize,
 ) -> Result<std::result::Result<Converged, String>> {
     let numbering = &mesh.numbering;
-    let mut matrix = clock
-        .time(Phase::Assemble, || solver::matrix(world, &model.grid, numbering, &mesh.pattern))?;
+    let mut matrix =
+        clock.time(Phase::Assemble, || solver::matrix(world, model, numbering, &mesh.pattern))?;
     let mut solution = matrix.vector()?;
     let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
     let stabilised = model.stabilised();
@@ -164,8 +165,8 @@ fn solve_robustly<const D: usize>(
     solution: &mut Vector,
 ) -> Result<(NewtonOutcome, Option<String>)> {
     let linear = Linear::of::<D>(equations, stabilised, trials)?;
-    let most = problem.settings().max_evaluations;
-    let mut snes = solver::newton(world, linear, null_pivots, most)?;
+    let (most, symmetric) = (problem.settings().max_evaluations, problem.settings().symmetric);
+    let mut snes = solver::newton(world, linear, symmetric, null_pivots, most)?;
     let outcome = snes.solve(problem, matrix, solution)?;
     trials.note(linear, !outcome.converged);
     let stronger = linear.stronger::<D>(equations, outcome.linear_failure);
@@ -173,7 +174,7 @@ fn solve_robustly<const D: usize>(
         return Ok((outcome, None));
     };
     let before = snes.ksp()?.describe()?;
-    let mut snes = solver::newton(world, stronger, null_pivots, most)?;
+    let mut snes = solver::newton(world, stronger, symmetric, null_pivots, most)?;
     let after = snes.ksp()?.describe()?;
     if before == after {
         // The user's options chose both.

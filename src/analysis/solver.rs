@@ -9,7 +9,6 @@
 
 use crate::deck::model::AnalysisType;
 use crate::error::Result;
-use crate::grid::Grid;
 use crate::mass::inverse;
 use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
@@ -29,6 +28,12 @@ const DIRECT: [usize; 2] = [10_000, 3_000];
 const TRIAL: usize = 100;
 /// Steps after a failed trial that start with the direct solver.
 const PAUSE: u64 = 10;
+/// Directions that FGMRES keeps, two vectors each: more than multigrid needs.
+const RESTART: &str = "100";
+/// Backtracking accepts |F'|^2 <= |F|^2 (1 - 2 alpha): the residual may grow fourteenfold in an
+/// iteration. A search that lets it grow not at all fails on bends and collapses that full steps
+/// solve (docs/evidence/unsymmetric.md).
+const GROWTH: &str = "-100";
 /// Up to here the direct solver runs on one rank.
 const ONE_RANK: [usize; 2] = [150_000, 30_000];
 
@@ -39,7 +44,8 @@ pub enum Linear {
     DirectOnOne,
     /// MUMPS on all ranks.
     Direct,
-    /// Conjugate gradients with smoothed aggregation and the rigid-body modes.
+    /// Conjugate gradients, or FGMRES where the tangent is unsymmetric, with smoothed aggregation
+    /// and the rigid-body modes.
     Multigrid,
     /// The same if it converges quickly.
     Trial,
@@ -114,8 +120,9 @@ impl Linear {
         self == Linear::DirectOnOne && ranks > 1
     }
 
-    /// Options without the prefix, on `ranks` ranks.
-    pub fn options(self, ranks: usize) -> Vec<(&'static str, String)> {
+    /// Options without the prefix, on `ranks` ranks. An unsymmetric tangent comes with a line search
+    /// on the norm of the residual: the models that have one are not smooth.
+    pub fn options(self, ranks: usize, symmetric: bool) -> Vec<(&'static str, String)> {
         const PACKAGE: &str = "mumps";
         let list: &[(&str, &str)] = match self {
             Linear::DirectOnOne if self.gathers(ranks) => &[
@@ -137,8 +144,9 @@ impl Linear {
             ],
             // The first iterate's hierarchy serves the whole step, unless it has become slow.
             Linear::Multigrid | Linear::Trial => &[
-                ("ksp_type", "cg"),
+                ("ksp_type", if symmetric { "cg" } else { "fgmres" }),
                 ("ksp_rtol", "1e-8"),
+                ("ksp_gmres_restart", RESTART),
                 ("pc_type", "mg"),
                 ("snes_lag_preconditioner", "1000"),
             ],
@@ -150,6 +158,10 @@ impl Linear {
             Linear::Trial => options.push(("ksp_max_it", TRIAL.to_string())),
             Linear::Direct | Linear::DirectOnOne => {}
         }
+        if !symmetric {
+            options.push(("snes_linesearch_type", "bt".into()));
+            options.push(("snes_linesearch_alpha", GROWTH.into()));
+        }
         if self.gathers(ranks) {
             options.push(("pc_telescope_reduction_factor", ranks.to_string()));
         }
@@ -160,15 +172,16 @@ impl Linear {
 /// Of the options of the equilibrium solver.
 const PREFIX: &str = "qs_";
 
-/// Newton's method with a built-in linear solver. `null_pivots`: the
+/// Newton's method with a built-in linear solver. `symmetric`: the tangent is; `null_pivots`: the
 /// system may be singular and consistent, and a direct solver has to look for zero pivots.
 pub fn newton(
     world: &World,
     linear: Linear,
+    symmetric: bool,
     null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
-    newton_under(PREFIX, world, linear, null_pivots, max_evaluations)
+    newton_under(PREFIX, world, linear, symmetric, null_pivots, max_evaluations)
 }
 
 /// The same with options of another prefix.
@@ -176,11 +189,12 @@ fn newton_under(
     prefix: &str,
     world: &World,
     linear: Linear,
+    symmetric: bool,
     null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), prefix, max_evaluations.saturating_sub(1).max(1))?;
-    let mut defaults = linear.options(world.size());
+    let mut defaults = linear.options(world.size(), symmetric);
     if !factors(prefix)? {
         // Mumps has no others than those of LU and Cholesky.
         defaults.retain(|(name, _)| *name != "pc_factor_mat_solver_type");
@@ -219,13 +233,14 @@ pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usiz
     }
     let Some(rehearsal) = Rehearsal::new(PREFIX)? else { return Ok(()) };
     let linear = Linear::of::<D>(equations, model.stabilised(), &Trials::default())?;
-    rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, false, 3))
+    let symmetric = model.symmetric();
+    rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, symmetric, false, 3))
 }
 
 /// The system's matrix, still zero, with its block size and near-null space. Collective.
 pub fn matrix<const D: usize>(
     world: &World,
-    grid: &Grid<D>,
+    model: &Model<D>,
     numbering: &Numbering,
     pattern: &Pattern,
 ) -> Result<Matrix> {
@@ -244,10 +259,10 @@ pub fn matrix<const D: usize>(
         }
     }
     let mut matrix = Matrix::zeros(world.comm(), D, rows, &offsets, &columns)?;
-    matrix.set_symmetric(true)?;
+    matrix.set_symmetric(model.symmetric())?;
     let coordinates: Vec<f64> = numbering.nodes[..numbering.owned]
         .iter()
-        .flat_map(|&node| grid.node_position(node))
+        .flat_map(|&node| model.grid.node_position(node))
         .collect();
     matrix.set_rigid_body_near_null_space(&coordinates)?;
     Ok(matrix)

@@ -69,6 +69,7 @@ pub struct Analysis {
     /// With `on_failure = "cut"`: the smallest step, as a fraction of the nominal one (default 1/1024).
     pub smallest_step: f64,
     pub inverted_iterates: InvertedIterates,
+    pub tangent: Tangent,
     /// Implicit dynamics: Newmark beta, gamma; or HHT alpha in [-1/3, 0] which sets both.
     pub newmark_beta: f64,
     pub newmark_gamma: f64,
@@ -79,6 +80,15 @@ pub struct Analysis {
 pub enum OnFailure {
     Stop,
     Cut,
+}
+
+/// How the tangent of implicit steps is kept and solved with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Tangent {
+    /// As symmetric where all materials and loads have a symmetric one.
+    Auto,
+    /// As unsymmetric, whatever they say.
+    Unsymmetric,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

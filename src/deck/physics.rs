@@ -18,6 +18,7 @@ pub fn physics(deck: &Deck) -> String {
     deck.analysis.max_iterations = 0;
     deck.analysis.on_failure = OnFailure::Stop;
     deck.analysis.inverted_iterates = super::model::InvertedIterates::Reject;
+    deck.analysis.tangent = super::model::Tangent::Auto;
     let name_only = |path: &mut std::path::PathBuf| {
         if let Some(name) = path.file_name() {
             *path = name.into();

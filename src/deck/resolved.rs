@@ -110,6 +110,7 @@ fn analysis(w: &mut Writer, deck: &Deck) {
     w.line("analysis", "on_failure", quote(a.on_failure.name()));
     w.line("analysis", "smallest_step", number(a.smallest_step));
     w.line("analysis", "inverted_iterates", quote(a.inverted_iterates.name()));
+    w.line("analysis", "tangent", quote(a.tangent.name()));
     w.line("analysis", "newmark_beta", number(a.newmark_beta));
     w.line("analysis", "newmark_gamma", number(a.newmark_gamma));
     w.line("analysis", "hht_alpha", number(a.hht_alpha));

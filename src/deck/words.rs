@@ -2,7 +2,8 @@
 
 use super::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
-    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, VerifyNorm,
+    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
+    VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -38,6 +39,7 @@ words! {
     }
     OnFailure { "stop" => Stop, "cut" => Cut }
     InvertedIterates { "reject" => Reject, "allow" => Allow }
+    Tangent { "auto" => Auto, "unsymmetric" => Unsymmetric }
     Basis { "mpm" => Mpm, "gimp" => Gimp, "cpdi1" => Cpdi1, "cpdi2" => Cpdi2 }
     DomainUpdate {
         "none" => None,

@@ -66,6 +66,13 @@ impl Material {
         }
     }
 
+    /// Whether the consistent tangent is symmetric: the flow is associated.
+    pub fn symmetric(&self) -> bool {
+        match self {
+            Material::Hencky(_) | Material::VonMises(_) => true,
+        }
+    }
+
     /// The elastic part, for energies and wave speeds.
     pub fn elasticity(&self) -> &Hencky {
         match self {

@@ -82,23 +82,45 @@ impl<T: Stored> BlockProduct<T> {
         BlockProduct { own: Own::Symmetric(own), other, ghosts, size, wide: K }
     }
 
-    /// The values of a symmetric matrix, as in [`Self::collect`]; again when they have changed.
+    /// The same for a square matrix that need not be symmetric: all of its blocks are kept.
+    ///
+    /// # Panics
+    /// As [`Self::collect`].
+    pub fn unsymmetric<const K: usize>(rows: usize, ghosts: Vec<i32>, blocks: usize) -> Self {
+        let new = |blocks| Blocks::growing([K, K], blocks).expect("blocks with a kernel").finish();
+        let size = [rows * K; 2];
+        BlockProduct { own: Own::Whole(new(blocks)), other: new(0), ghosts, size, wide: K }
+    }
+
+    /// The values of a square matrix, as in [`Self::collect`]; again when they have changed.
     pub fn fill<const K: usize>(&mut self, row: impl FnMut(usize, &mut Row<K, K>)) {
-        let Own::Symmetric(half) = &mut self.own else { return };
-        half.clear();
-        let mut other = Blocks::growing([K, K], 0).expect("blocks with a kernel");
         let rows = self.size[0] / K;
-        each_row(rows, rows, row, |inside, outside| {
-            half.push(inside);
-            other.push(outside);
-        });
+        let empty = || Blocks::growing([K, K], 0).expect("blocks with a kernel").finish();
+        let mut other = std::mem::replace(&mut self.other, empty()).regrow();
+        match &mut self.own {
+            Own::Symmetric(half) => {
+                half.clear();
+                each_row(rows, rows, row, |inside, outside| {
+                    half.push(inside);
+                    other.push(outside);
+                });
+            }
+            Own::Whole(blocks) => {
+                let mut own = std::mem::replace(blocks, empty()).regrow();
+                each_row(rows, rows, row, |inside, outside| {
+                    own.push(inside);
+                    other.push(outside);
+                });
+                *blocks = own.finish();
+            }
+        }
         self.other = other.finish();
     }
 
-    /// Diagonal entries of a symmetric matrix, else none.
+    /// Diagonal entries of a square matrix.
     pub fn diagonal(&self) -> Vec<f64> {
         match &self.own {
-            Own::Whole(_) => Vec::new(),
+            Own::Whole(blocks) => blocks.diagonal(self.size[0]),
             Own::Symmetric(half) => half.diagonal(),
         }
     }
@@ -140,7 +162,7 @@ impl<T: Stored> BlockProduct<T> {
 }
 
 impl BlockProduct<f64> {
-    /// The same in single precision, in the place of what `target` held.
+    /// A symmetric matrix in single precision, in the place of what `target` held.
     pub fn round_into(&self, target: &mut BlockProduct<f32>) {
         if let (Own::Symmetric(own), Own::Symmetric(target)) = (&self.own, &mut target.own) {
             own.round_into(target);

@@ -77,6 +77,37 @@ impl<T: Stored> Blocks<T> {
         Some(Growing { blocks, filled: Vec::new(), count: 0 })
     }
 
+    /// The same room for other rows, [`Growing::push`]ed anew.
+    pub fn regrow(self) -> Growing<T> {
+        let mut blocks = self;
+        blocks.rows = None;
+        blocks.offsets.truncate(1);
+        blocks.columns.clear();
+        blocks.values.clear();
+        Growing { blocks, filled: Vec::new(), count: 0 }
+    }
+
+    /// The diagonal entries of a square matrix, zero where there is no block.
+    pub fn diagonal(&self, rows: usize) -> Vec<f64> {
+        let size = match self.shape {
+            Shape::Two | Shape::TwoByThree => 2,
+            Shape::Three => 3,
+        };
+        let mut diagonal = vec![0.0; rows];
+        for (k, range) in self.offsets.windows(2).enumerate() {
+            let (row, blocks) = (self.row(k), range[0] as usize..range[1] as usize);
+            let Some(at) = self.columns[blocks.clone()].iter().position(|&c| c as usize == row)
+            else {
+                continue;
+            };
+            let first = (blocks.start + at) * self.shape.values();
+            for (i, entry) in diagonal[row * size..].iter_mut().take(size).enumerate() {
+                *entry = self.values[first + i * (size + 1)].into();
+            }
+        }
+        diagonal
+    }
+
     /// y = A x. Rows without entries are set to zero.
     pub fn multiply(&self, x: &[f64], y: &mut [f64]) {
         if self.rows.is_some() {

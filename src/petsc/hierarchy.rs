@@ -4,6 +4,7 @@
 //! (`-<prefix>mg_levels_ksp_type`, `-<prefix>mg_coarse_pc_type`, ...). Smoothers, residuals and
 //! transfers multiply by matrices in single precision: they stream from memory, and have less
 //! than half the bytes. The iteration outside keeps the exact matrix, so the answer is the same.
+//! The levels are symmetric. Under an unsymmetric matrix A they are those of (A + A^T) / 2.
 
 use std::ptr::{null, null_mut};
 
@@ -20,7 +21,7 @@ use crate::error::{Error, Result};
 
 /// Levels from the finest to the last but one, and the last.
 pub struct Hierarchy {
-    /// The matrix itself: symmetric, and like that of the finest level but for the rounding.
+    /// The matrix A itself. That of the finest level is its symmetric part, rounded.
     pub exact: BlockProduct<f64>,
     pub levels: Vec<Smoothed>,
     pub coarsest: CoarsestRows,
@@ -115,26 +116,20 @@ impl Installed {
         self.made == state || (kept && !self.slow)
     }
 
-    /// Lets `fill` write the values of `state` where the finest matrix is multiplied by, if they
-    /// are not there yet; its smoother follows, the other levels stay.
+    /// Lets `fill` write the values of `state` into the exact matrix and the finest level's, if
+    /// they are not there yet; the finest smoother follows, the other levels stay.
     pub fn follow(
         &mut self,
         ksp: sys::KSP,
         state: sys::PetscObjectState,
-        fill: impl FnOnce(&mut BlockProduct<f64>) -> Result<()>,
+        fill: impl FnOnce(&mut BlockProduct<f64>, &mut BlockProduct<f32>) -> Result<()>,
     ) -> Result<()> {
         if self.filled == state {
             return Ok(());
         }
         self.filled = state;
         let finest = &mut self.finest;
-        self.exact.change(|exact| {
-            fill(exact)?;
-            finest.change(|rounded| {
-                exact.round_into(rounded);
-                Ok(())
-            })
-        })?;
+        self.exact.change(|exact| finest.change(|rounded| fill(exact, rounded)))?;
         let (mut pc, mut levels, mut smoother) = (null_mut(), 0, null_mut());
         petsc!(KSPGetPC(ksp, &mut pc))?;
         petsc!(PCMGGetLevels(pc, &mut levels))?;

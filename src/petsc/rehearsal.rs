@@ -187,8 +187,14 @@ impl<const D: usize> NewtonProblem for Chain<D> {
         Ok(Some(Hierarchy { exact, levels, coarsest: rows::<D>(self.first) }))
     }
 
-    fn fill(&mut self, _matrix: &mut Matrix, exact: &mut BlockProduct<f64>) -> Result<()> {
+    fn fill(
+        &mut self,
+        _matrix: &mut Matrix,
+        exact: &mut BlockProduct<f64>,
+        finest: &mut BlockProduct<f32>,
+    ) -> Result<()> {
         exact.fill::<D>(push::<D>);
+        exact.round_into(finest);
         Ok(())
     }
 }

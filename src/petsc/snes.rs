@@ -59,14 +59,20 @@ pub trait NewtonProblem {
         f64::INFINITY
     }
 
-    /// Levels for a preconditioner of type `mg`, for the values that the matrix has; it is
-    /// symmetric. `None`: there are none for it.
+    /// Levels for a preconditioner of type `mg`, for the values that the matrix has. `None`: there
+    /// are none for it.
     fn hierarchy(&mut self, _matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         Ok(None)
     }
 
-    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact.
-    fn fill(&mut self, _matrix: &mut Matrix, _exact: &mut BlockProduct<f64>) -> Result<()> {
+    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact, and their
+    /// symmetric part into the matrix of its finest level.
+    fn fill(
+        &mut self,
+        _matrix: &mut Matrix,
+        _exact: &mut BlockProduct<f64>,
+        _finest: &mut BlockProduct<f32>,
+    ) -> Result<()> {
         Ok(())
     }
 }
@@ -229,7 +235,8 @@ impl Snes {
             petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
             petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
         }
-        let converged = reason > 0;
+        let at_zero = reason == sys::SNES_DIVERGED_LINE_SEARCH && self.residual_is_zero()?;
+        let converged = reason > 0 || (at_zero && context.judge_again(self.raw)?);
         let linear_failure = !converged && reason == sys::SNES_DIVERGED_LINEAR_SOLVE;
         let reason = match (context.diverged, context.linear_failure) {
             _ if converged => "converged".to_owned(),
@@ -248,6 +255,15 @@ impl Snes {
             linear_failure,
             reason,
         })
+    }
+
+    /// Whether the last residual is zero to the last bit: there is no direction to search along, and
+    /// PETSc's line searches take that for a failure.
+    fn residual_is_zero(&self) -> Result<bool> {
+        let (mut f, mut norm) = (null_mut(), 0.0);
+        petsc!(SNESGetFunction(self.raw, &mut f, null_mut(), null_mut()))?;
+        petsc!(VecNorm(f, sys::NORM_2, &mut norm))?;
+        Ok(norm == 0.0)
     }
 
     /// Drops the vectors and factors of the last matrix; options and limits stay.
@@ -313,8 +329,19 @@ impl<P: NewtonProblem> Context<'_, P> {
         }
         let Some(levels) = &mut self.levels else { return Ok(()) };
         let (problem, matrix) = (&mut *self.problem, &mut *self.matrix);
-        levels.follow(inner, state, |exact| problem.fill(matrix, exact))?;
+        levels.follow(inner, state, |exact, finest| {
+            // Ranks write their rows together: an error on one must not leave the others waiting.
+            agree(self.comm, problem.fill(matrix, exact, finest))
+        })?;
         levels.multiply_by_copy(inner, self.matrix.raw())
+    }
+
+    /// Whether the iterate, reached once more by a step of zero, is converged on all ranks.
+    fn judge_again(&mut self, snes: sys::SNES) -> Result<bool> {
+        let iteration = self.linear_solves;
+        let verdict = judge(self, snes, iteration);
+        let verdict = agree(self.comm, verdict)?;
+        Ok(self.largest(i32::from(verdict != Verdict::Converged)) == 0)
     }
 
     /// Largest of the ranks' numbers.

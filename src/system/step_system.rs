@@ -10,7 +10,7 @@ use super::populated::Populated;
 use super::terms::stress::StepPoints;
 use crate::basis::{self, Groups, Influences};
 use crate::deck::Deck;
-use crate::deck::model::{Basis, PointVolume};
+use crate::deck::model::{Basis, PointVolume, Tangent};
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
@@ -42,6 +42,13 @@ impl<const D: usize> Model<D> {
     /// Whether every body has Ghost stiffness.
     pub fn stabilised(&self) -> bool {
         self.penalties.iter().all(|penalty| penalty.stiffness > 0.0)
+    }
+
+    /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the
+    /// deck does not ask for the general path.
+    pub fn symmetric(&self) -> bool {
+        self.deck.analysis.tangent == Tangent::Auto
+            && self.materials.iter().all(Material::symmetric)
     }
 
     /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.

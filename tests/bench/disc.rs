@@ -53,7 +53,7 @@ impl Case {
         let results = folder.join("results");
         let mut command = Command::new(env!("CARGO_BIN_EXE_mpm-par"));
         command.arg(&deck).arg("--out").arg(&results).arg("--force");
-        for (name, value) in Linear::Multigrid.options(1) {
+        for (name, value) in Linear::Multigrid.options(1, true) {
             command.arg(format!("-qs_{name}")).arg(value);
         }
         for name in ["OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "OMP_NUM_THREADS"]

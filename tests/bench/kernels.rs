@@ -341,10 +341,11 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         max_evaluations: 10,
         frame,
         inverted: model.deck.analysis.inverted_iterates,
+        symmetric: true,
     };
     let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
     let owned = numbering.owned * D;
-    let empty = || solver::matrix(world, &model.grid, numbering, &mesh.pattern);
+    let empty = || solver::matrix(world, &model, numbering, &mesh.pattern);
     let equations = || {
         let external = vec![0.0; owned];
         let grid = &model.grid;

@@ -9,7 +9,8 @@ use super::{POSITIVE, Section, at_least, between, key};
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
-    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, VerifyNorm,
+    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
+    VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -62,6 +63,9 @@ pub const SECTIONS: &[Section] = &[
                 .range(super::Range { low_included: false, ..between(0.0, 1.0) }),
             key("inverted_iterates", Choice(InvertedIterates::NAMES), Default("\"reject\""),
                 "Iterates in which a point is turned inside out (det dF <= 0)."),
+            key("tangent", Choice(Tangent::NAMES), Default("\"auto\""),
+                "`auto`: symmetric storage and solvers where all materials have a symmetric \
+                 tangent. `unsymmetric`: the general ones (FGMRES, line search) in any case."),
             key("newmark_beta", Number, Default("0.25"), "Implicit dynamics.")
                 .range(super::Range { low_included: false, ..between(0.0, 0.5) }),
             key("newmark_gamma", Number, Default("0.5"), "Implicit dynamics.")

@@ -18,6 +18,7 @@ pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
     let on_failure = table.choice("on_failure");
     let smallest_step = table.number("smallest_step");
     let inverted_iterates = table.choice("inverted_iterates");
+    let tangent = table.choice("tangent");
     let newmark = (table.number("newmark_beta"), table.number("newmark_gamma"));
     let hht_alpha = table.number("hht_alpha");
     let kind = kind?;
@@ -51,6 +52,7 @@ pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
         on_failure: on_failure?,
         smallest_step: smallest_step?,
         inverted_iterates: inverted_iterates?,
+        tangent: tangent?,
         newmark_beta,
         newmark_gamma,
         hht_alpha,
