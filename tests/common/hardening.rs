@@ -19,6 +19,8 @@ pub struct Hardening<'a, const D: usize> {
     share: Share<D>,
     levels: bool,
     symmetric: bool,
+    /// c
+    load: f64,
     /// Hierarchies made, and renewals of the finest matrix.
     made: [usize; 2],
     residual: f64,
@@ -32,7 +34,7 @@ impl<const D: usize> Hardening<'_, D> {
             for k in offsets[row]..offsets[row + 1] {
                 if columns[k] as usize == row {
                     for axis in 0..D {
-                        values[k][axis][axis] += 3.0 * HARDENING * x[row * D + axis].powi(2);
+                        values[k][axis][axis] += 3.0 * self.load * x[row * D + axis].powi(2);
                     }
                 }
             }
@@ -96,7 +98,7 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
                     let x = &all[columns[k] as usize * D..];
                     (0..D).map(move |s| values[k][r][s] * x[s])
                 });
-                f[row * D + r] = terms.sum::<f64>() + HARDENING * (x[row * D + r].powi(3) - 1.0);
+                f[row * D + r] = terms.sum::<f64>() + self.load * (x[row * D + r].powi(3) - 1.0);
             }
         }
         self.residual = self.world.sum(f.iter().map(|f| f * f).sum()).sqrt();
@@ -179,9 +181,22 @@ pub fn solve_as<const D: usize>(
     levels: bool,
     symmetric: bool,
 ) -> Result<Solved> {
+    solve_under(world, block, prefix, options, levels, symmetric, HARDENING)
+}
+
+/// The same with another c.
+pub fn solve_under<const D: usize>(
+    world: &World,
+    block: Block<D>,
+    prefix: &str,
+    options: &[(&str, &str)],
+    levels: bool,
+    symmetric: bool,
+    load: f64,
+) -> Result<Solved> {
     let share = block.share(world);
     let mut problem =
-        Hardening { world, share, levels, symmetric, made: [0; 2], residual: f64::NAN };
+        Hardening { world, share, levels, symmetric, load, made: [0; 2], residual: f64::NAN };
     let (offsets, columns, values) = problem.scalars(&problem.share.rows);
     let rows = problem.share.nodes.owned * D;
     let mut matrix = Matrix::from_csr(world.comm(), D, rows, &offsets, &columns, &values).unwrap();
