@@ -237,7 +237,7 @@ pub struct MeshGrid {
 
 #[derive(Debug, Clone, PartialEq)]
 pub enum MeshSource {
-    /// Gmsh 4.1 file, absolute or relative to the deck's folder (already joined).
+    /// Gmsh file, absolute or relative to the deck's folder (already joined).
     File(PathBuf),
     /// Circular (inner = [r, r]) or elliptic hole in a disc of radius `outer`, m.
     /// `grading` >= 1 refines around the ends of the long axis (1: uniform).

@@ -6,6 +6,7 @@
 //! | inverted or flat cell | det J <= 0 at a corner |
 //! | duplicate cell | two cells with the same nodes |
 //! | face of three cells | faces with the same nodes |
+//! | cell folded over its neighbour | both list their common face in the same direction |
 //! | hanging or doubled node | a node on an outer face that is not one of the face's nodes |
 
 use std::collections::BTreeMap;
@@ -52,6 +53,7 @@ impl<const D: usize> Draft<D> {
         self.check_duplicates()?;
         let topology = Topology::new(self.element, &self.cells, self.positions.len())
             .map_err(|third| self.third_cell(&third))?;
+        self.check_folds(&topology)?;
         let bins = Bins::new(self.element, &self.positions, &self.cells, &topology.neighbours);
         self.check_hanging(&topology, &bins)?;
         let Self { name, element, positions, cells, mut node_sets, mut cell_sets, .. } = self;
@@ -133,6 +135,39 @@ impl<const D: usize> Draft<D> {
                     )));
                 }
                 other = before[other as usize];
+            }
+        }
+        Ok(())
+    }
+
+    /// Two cells that are both listed in the positive sense go round their common face in opposite
+    /// directions. If they do not, both lie on the same side of it.
+    fn check_folds(&self, topology: &Topology) -> Result<()> {
+        let faces = self.element.faces();
+        for (cell, across) in topology.neighbours.chunks_exact(faces.len()).enumerate() {
+            let nodes = self.nodes_of(cell);
+            for (face, &other) in faces.iter().zip(across) {
+                // Each pair is looked at from its first cell.
+                if other == OUTSIDE || (other as usize) < cell {
+                    continue;
+                }
+                let (from, to) = (nodes[face[0]], nodes[face[1]]);
+                let theirs = self.nodes_of(other as usize);
+                // An edge has one direction; a ring of nodes has one between each two.
+                let pairs = if face.len() == 2 { 1 } else { face.len() };
+                let directed = faces.iter().any(|face| {
+                    let ring = |k: usize| theirs[face[k % face.len()]];
+                    (0..pairs).any(|k| (ring(k), ring(k + 1)) == (to, from))
+                        && face.iter().all(|&a| nodes.contains(&theirs[a]))
+                });
+                if !directed {
+                    let (one, two) = (self.cell(cell), self.cell(other as usize));
+                    return Err(Error::Input(format!(
+                        "{}: {one} and {two} lie on the same side of their common face: one is \
+                         folded over the other; move or remove the nodes that make it so",
+                        self.name
+                    )));
+                }
             }
         }
         Ok(())

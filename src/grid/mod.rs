@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | `type = "lattice"` | [`Lattice`]: equal boxes, topology by arithmetic | `lattice.rs` |
 //! | `type = "mesh"` | [`Mesh`]: tri3, quad4, tet4, hex8 with faces and tags | `mesh.rs` |
-//! | `file` | Gmsh 4.1 reader | `gmsh.rs` |
+//! | `file` | Gmsh files, versions 2.2, 4.0, 4.1 | `gmsh.rs`, `msh/` |
 //! | `generate` | boxes and rings | `generate.rs` |
 //! | `motion` | rotation and following the material (Rotation §2 (viii)) | `motion.rs` |
 //! | `element` | shape functions; inverse maps | `element.rs`, `inverse_map.rs` |
@@ -25,6 +25,7 @@ pub mod lattice;
 pub mod locate;
 pub mod mesh;
 pub mod motion;
+pub mod msh;
 pub mod quadrature;
 mod topology;
 

@@ -138,7 +138,7 @@ pub const SECTIONS: &[Section] = &[
             key("h", NumberOrVector, Optional("needed by a lattice"), "Lattice: spacing.")
                 .unit("m").range(POSITIVE),
             key("file", Text, Optional("a mesh needs file or generate"),
-                "Mesh: Gmsh 4.1 file; a relative path starts at the deck."),
+                "Mesh: Gmsh file, version 2.2, 4.0 or 4.1; a relative path starts at the deck."),
             key("dimension", Count, Optional("2; only with file"), "Mesh from a file: 2 or 3.")
                 .range(between(2.0, 3.0)),
             key("generate", Table("grid.generate"), Optional("a mesh needs file or generate"),
