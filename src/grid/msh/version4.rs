@@ -115,6 +115,12 @@ pub(super) fn nodes(
             }
         }
     }
+    if nodes.len() as u64 != all {
+        return Err(Fault(format!(
+            "{all} nodes are announced, and {} of them are there",
+            nodes.len()
+        )));
+    }
     Ok(())
 }
 
