@@ -24,8 +24,20 @@ pub struct Arguments {
     pub restart: Option<Restart>,
     /// Overwrite existing results.
     pub force: bool,
+    pub voice: Voice,
     /// PETSc options and their values, untouched and in order.
     pub petsc: Vec<String>,
+}
+
+/// How much the terminal shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Voice {
+    /// Warnings and errors.
+    Quiet,
+    #[default]
+    Normal,
+    /// Every step, here and in the log.
+    Verbose,
 }
 
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +48,7 @@ pub enum Restart {
 }
 
 const USAGE: &str = "mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out DIR] \
-     [--check] [--restart FILE|last] [--force] [PETSc options]";
+     [--check] [--restart FILE|last] [--force] [--quiet|--verbose] [PETSc options]";
 
 /// Distributed material point method: runs the analysis that INPUT.toml describes.
 #[derive(Debug, Parser)]
@@ -67,6 +79,12 @@ struct Words {
     /// Overwrite existing results
     #[arg(long)]
     force: bool,
+    /// Show warnings and errors only; log.txt stays complete
+    #[arg(long, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Show every step
+    #[arg(long)]
+    verbose: bool,
     /// Print help
     #[arg(long, action = clap::ArgAction::Help)]
     help: Option<bool>,
@@ -102,6 +120,11 @@ pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Arguments> {
         check: words.check,
         restart,
         force: words.force,
+        voice: match (words.quiet, words.verbose) {
+            (true, _) => Voice::Quiet,
+            (_, true) => Voice::Verbose,
+            _ => Voice::Normal,
+        },
         petsc,
     })
 }
@@ -215,12 +238,21 @@ mod tests {
             ("deck.toml other.toml", "other.toml"),
             ("deck.toml --set", "--set <KEY=VALUE>"),
             ("deck.toml --out a --out b", "--out"),
+            ("deck.toml --quiet --verbose", "--verbose"),
         ] {
             let error = read(line).expect_err(line);
             assert_eq!(error.exit_code(), 2);
             let text = error.to_string();
             assert!(text.contains(part) && text.contains("Usage: mpirun -n N mpm-par"), "{text}");
         }
+    }
+
+    #[test]
+    fn one_voice() {
+        let voice = |line| read(line).expect("valid").voice;
+        assert_eq!(voice("deck.toml"), Voice::Normal);
+        assert_eq!(voice("--quiet deck.toml -log_view"), Voice::Quiet);
+        assert_eq!(voice("deck.toml -log_view --verbose"), Voice::Verbose);
     }
 
     #[test]

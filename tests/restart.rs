@@ -445,3 +445,171 @@ fn a_run_that_failed_goes_on_with_other_settings() {
     let ends = [&whole, &out].map(|out| points_of(&out.join(reference)));
     assert_eq!(difference(&ends[0], &ends[1]).0, 0.0);
 }
+
+/// A dynamic run that is made twice as long goes on as if it had been so from the start, in the
+/// place where its last step left it: points bit by bit, and the rows of the history.
+#[test]
+fn a_dynamic_run_is_extended() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("fall.toml");
+    for kind in ["explicit", "implicit-dynamic"] {
+        fs::write(&deck, FALL.replace("KIND", kind)).unwrap();
+        let long = ["--set", "analysis.steps=16", "--set", "analysis.duration=0.0625"];
+        for ranks in [1, 2] {
+            let at = |name: &str| folder.path().join(format!("{kind}-{name}-{ranks}"));
+            let (whole, part) = (at("whole"), at("part"));
+            run_well(ranks, &deck, &whole, &long);
+            run_well(ranks, &deck, &part, &[]);
+            assert_eq!(summary(&part)["steps_completed"], 8);
+            // Output and tolerance may change on the way.
+            let more = ["--restart", "last", "--set", "output.every=4"];
+            run_well(ranks, &deck, &part, &[&long[..], &more].concat());
+            assert_eq!(summary(&part)["steps_completed"], 16);
+            let ends = [&whole, &part].map(|out| points_of(&out.join("checkpoint-000016.h5")));
+            let (error, field) = difference(&ends[0], &ends[1]);
+            assert_eq!(error, 0.0, "{kind}, {ranks} ranks: {field}");
+            for name in ["step", "time", "energy_kinetic", "energy_strain", "work_external"] {
+                assert_eq!(column(&part, name), column(&whole, name), "{kind}: {name}");
+            }
+        }
+    }
+}
+
+/// What an extension would change is refused, and nothing is touched.
+#[test]
+fn extensions_that_change_the_problem_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let refused = |name: &str, text: &str, sets: &[&str], said: &[&str]| {
+        let deck = folder.path().join(format!("{name}.toml"));
+        fs::write(&deck, text).unwrap();
+        let out = folder.path().join(name);
+        run_well(1, &deck, &out, &[]);
+        let before = contents(&out);
+        let mut words = vec!["--restart", "last"];
+        sets.iter().for_each(|set| words.extend(["--set", set]));
+        let output = run(1, &deck, &out, &words);
+        assert_eq!(output.status.code(), Some(3), "{}", self::text(&output));
+        for word in said {
+            assert!(self::text(&output).contains(word), "no `{word}` in {}", self::text(&output));
+        }
+        assert!(contents(&out) == before, "{name}: something was changed");
+    };
+    let fall = FALL.replace("KIND", "explicit");
+    refused("step", &fall, &["analysis.duration=0.0625"], &["time step = "]);
+    let shorter = ["analysis.steps=4", "analysis.duration=0.015625"];
+    refused("shorter", &fall, &shorter, &["behind the end", "analysis.steps = 4"]);
+    let moved = format!(
+        "{fall}\n[[boundary]]\nwhere = {{ side = \"left\" }}\ndisplacement = {{ x = \"0.01\" }}\n"
+    );
+    let long = ["analysis.steps=16", "analysis.duration=0.0625"];
+    refused("moved", &moved, &long, &["`steps = 8`", "totals over the whole", "formulas of t"]);
+    let still = FALL.replace("KIND", "quasi-static").replace("duration = 0.03125\n", "");
+    refused("still", &still, &["analysis.steps=16"], &["`steps = 8`", "totals over the whole"]);
+}
+
+/// Rows of the history at an interval: each is the row of its step in a history of all steps, with
+/// the sums of the iterations; also when the run goes on from between two rows.
+#[test]
+fn a_thinned_history_keeps_its_sums() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("fall.toml");
+    fs::write(&deck, FALL.replace("KIND", "implicit-dynamic")).unwrap();
+    let (all, thin) = (folder.path().join("all"), folder.path().join("thin"));
+    let checkpoints = ["--set", "output.checkpoint={every=1,keep=99}"];
+    let thinned = [&checkpoints[..], &["--set", "output.history=3", "--quiet"]].concat();
+    run_well(1, &deck, &all, &checkpoints);
+    let check = |out: &Path| {
+        assert_eq!(column(out, "step"), [3.0, 6.0, 8.0]);
+        for name in
+            ["time", "dt", "energy_kinetic", "energy_strain", "work_external", "reaction.floor.y"]
+        {
+            let every = column(&all, name);
+            assert_eq!(column(out, name), [every[2], every[5], every[7]], "{name}");
+        }
+        for name in ["newton_iterations", "linear_iterations"] {
+            let sum = |steps: std::ops::Range<usize>| column(&all, name)[steps].iter().sum::<f64>();
+            assert_eq!(column(out, name), [sum(0..3), sum(3..6), sum(6..8)], "{name}");
+        }
+    };
+    run_well(1, &deck, &thin, &thinned);
+    check(&thin);
+    for step in [2, 3, 5] {
+        let middle = thin.join(format!("checkpoint-{step:06}.h5")).display().to_string();
+        run_well(1, &deck, &thin, &[&thinned[..], &["--restart", &middle]].concat());
+        check(&thin);
+    }
+    let timed = folder.path().join("timed");
+    run_well(1, &deck, &timed, &["--set", "output.history={seconds=0.0078125}"]);
+    assert_eq!(column(&timed, "step"), [2.0, 4.0, 6.0, 8.0]);
+}
+
+/// A long explicit run tells of a step a second at most, on the terminal and in the log; the deck
+/// and the command line may ask for more or less.
+#[test]
+fn explicit_runs_do_not_tell_of_every_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = folder.path().join("fall.toml");
+    fs::write(
+        &deck,
+        FALL.replace("KIND", "explicit").replace("every = 8, keep", "every = 800, keep"),
+    )
+    .unwrap();
+    let steps = ["--set", "analysis.steps=400", "--set", "output.every=400"];
+    let lines = |name: &str, more: &[&str]| {
+        let out = folder.path().join(name);
+        let output = run_well(1, &deck, &out, &[&steps[..], more].concat());
+        let of = |text: &str| text.lines().filter(|line| line.contains("/400 ")).count();
+        let log = fs::read_to_string(out.join("log.txt")).unwrap();
+        let seconds = column(&out, "wall_seconds").last().copied().unwrap();
+        assert_eq!(column(&out, "step").len(), 400);
+        (of(&text(&output)), of(&log), seconds, text(&output))
+    };
+    let (shown, noted, seconds, _) = lines("plain", &[]);
+    assert!(
+        shown == noted && noted >= 2 && noted as f64 <= 2.0 + seconds,
+        "{shown} {noted} {seconds}"
+    );
+    let (shown, noted, ..) = lines("steps", &["--set", "output.log=150"]);
+    assert_eq!((shown, noted), (4, 4), "steps 1, 150, 300, 400");
+    let (shown, noted, ..) = lines("verbose", &["--verbose"]);
+    assert_eq!((shown, noted), (400, 400));
+    let (shown, noted, _, said) = lines("quiet", &["--quiet", "--set", "output.log=150"]);
+    assert_eq!((shown, noted), (0, 4));
+    assert!(!said.contains("mpm-par") && !said.contains("phase"), "{said}");
+}
+
+/// A block on a floor under gravity; steps and duration are such that doubling is exact.
+const FALL: &str = r#"
+title = "fall"
+[analysis]
+type = "KIND"
+steps = 8
+duration = 0.03125
+[method]
+basis = "mpm"
+mass = "lumped"
+[grid]
+type = "lattice"
+origin = [0, 0]
+size = [1, 1]
+h = 0.25
+[material.m]
+model = "hencky"
+young = 1e4
+poisson = 0.25
+[[body]]
+name = "block"
+material = "m"
+density = 1000
+shape = { box = { min = [0, 0], max = [1, 0.5] } }
+points_per_cell = [2, 2]
+[[boundary]]
+name = "floor"
+where = { side = "bottom" }
+fix = ["x", "y"]
+[[load]]
+gravity = [0, -10]
+[output]
+every = 1
+checkpoint = { every = 8, keep = 2 }
+"#;

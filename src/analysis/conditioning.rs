@@ -61,8 +61,9 @@ pub fn run<const D: usize>(
         row.step = number;
         row.wall_seconds = clock.elapsed();
         recorder.steps_completed = number;
+        let moment = if number == steps { Moment::End } else { Moment::Step };
         clock.time(Phase::Output, || {
-            recorder.step(world, &row, false)?;
+            recorder.step(world, &row, false, moment)?;
             if recorder.wants_frame(number, span.factor_end, number == steps) {
                 recorder.frame(world, number, span.factor_end, points)?;
             }
@@ -70,7 +71,6 @@ pub fn run<const D: usize>(
         })?;
         let mut state = RunState::new();
         state.set_count("conditioning.done", number as u64);
-        let moment = if number == steps { Moment::End } else { Moment::Step };
         if let Some(ending) = recorder.end_step(world, model, points, moment, state)? {
             return Ok(ending);
         }

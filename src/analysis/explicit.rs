@@ -83,7 +83,7 @@ pub fn run<const D: usize>(
         if let Err(why) = ledger.book(&entry, row) {
             // The row shows what happened.
             row.wall_seconds = clock.elapsed();
-            recorder.step(world, row, false)?;
+            recorder.step(world, row, false, Moment::End)?;
             let (limit, _) = limit_now(model, points);
             before.restore(points);
             let (time, state) = (span.time_start, state_of(&steps, &ledger));

@@ -22,7 +22,7 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::stress::StepPoints;
 
 use super::equilibrium::Equilibrium;
-use super::load_steps::Stepping;
+use super::load_steps::{Moment, Stepping};
 use super::newmark::{Newmark, PointRates, Rates};
 use super::newton::Carried;
 use super::quasi_static::{owned_forces, work_of_step};
@@ -94,7 +94,7 @@ pub fn run<const D: usize>(
                     Ok(()) => Ok(step),
                     Err(why) => {
                         // The row shows what happened.
-                        recorder.step(world, &step.solved.row, true)?;
+                        recorder.step(world, &step.solved.row, true, Moment::End)?;
                         Err(Fault::Final(format!(
                             "{why}; smaller steps, or analysis.hht_alpha = -0.1, damp what they \
                              excite"

@@ -78,7 +78,7 @@ pub fn finish<const D: usize>(
     let settle = || balance::settle(world, model, points, busy);
     row.moved_points = clock.time(Phase::Migrate, settle)?.moved;
     row.wall_seconds = clock.elapsed();
-    clock.time(Phase::Output, || recorder.step(world, &row, newton))?;
+    clock.time(Phase::Output, || recorder.step(world, &row, newton, moment))?;
     let stop =
         clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;
     Ok(Finished { framed, stop })

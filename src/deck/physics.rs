@@ -2,8 +2,13 @@
 //!
 //! Left out: title, output, verify, parallel, PETSc options, and how hard the solver tries
 //! (tolerance, iterations, what happens on failure): these may change between the parts of a run.
+//! A dynamic run may also be extended, as long as nothing in its deck is a total over the whole
+//! analysis: then its time step counts, and not how many steps there are.
 
-use super::model::{BodySource, Deck, Every, Grid, MeshSource, OnFailure, Output};
+use super::expression::{Expression, Variable};
+use super::model::{
+    AnalysisType, BodySource, Deck, Every, Grid, Load, MeshSource, OnFailure, Output,
+};
 use super::resolved::resolved;
 
 /// The resolved deck without what may change. Files are named without their folder, so that a
@@ -13,7 +18,21 @@ pub fn physics(deck: &Deck) -> String {
     deck.title.clear();
     deck.verify.clear();
     deck.petsc.clear();
-    deck.output = Output { every: Every::Steps(1), fields: Vec::new(), checkpoint: None };
+    deck.output = Output {
+        every: Every::Steps(1),
+        history: Every::Steps(1),
+        log: None,
+        fields: Vec::new(),
+        checkpoint: None,
+    };
+    let mut time_step = String::new();
+    if may_be_extended(&deck) {
+        if let (Some(steps), Some(duration)) = (deck.analysis.steps, deck.analysis.duration) {
+            // 0.3/30 and 0.5/50 differ in the last bit.
+            time_step = format!("time step = {:.12e} s\n", duration / steps as f64);
+        }
+        (deck.analysis.steps, deck.analysis.duration) = (None, None);
+    }
     deck.analysis.tolerance = 0.0;
     deck.analysis.max_iterations = 0;
     deck.analysis.on_failure = OnFailure::Stop;
@@ -37,7 +56,29 @@ pub fn physics(deck: &Deck) -> String {
     // Without Ghost there is no [ghost]; checkpoints of earlier versions say no more than that.
     let text = resolved(&deck).replacen("\nghost = \"off\"\n", "\n", 1);
     // What follows [output] is about the run, not about the problem.
-    text.split("\n[output]").next().unwrap_or_default().trim().to_string()
+    let text = text.split("\n[output]").next().unwrap_or_default().trim();
+    format!("{time_step}{text}")
+}
+
+/// Whether more steps or a longer duration leave what has been computed as it is. In quasi-static
+/// and conditioning runs loads and displacements are totals over all steps; in dynamics prescribed
+/// displacements, rotations and formulas of s are, as s goes from 0 to 1 over the analysis.
+fn may_be_extended(deck: &Deck) -> bool {
+    let of_factor = |expression: &Expression| expression.depends_on(Variable::LoadFactor);
+    let total = |(_, expression): &(usize, Expression)| {
+        of_factor(expression) || !expression.depends_on_time()
+    };
+    let boundary_totals = deck
+        .boundaries
+        .iter()
+        .any(|boundary| boundary.rotation.is_some() || boundary.displacement.iter().any(total));
+    let load_totals = deck.loads.iter().any(|load| match load {
+        Load::BodyForce(all) | Load::Manufactured(all) => all.iter().any(of_factor),
+        Load::Point { .. } | Load::Gravity(_) => false,
+    });
+    let dynamic =
+        matches!(deck.analysis.kind, AnalysisType::Explicit | AnalysisType::ImplicitDynamic);
+    dynamic && !boundary_totals && !load_totals
 }
 
 /// The first lines in which two such texts differ, `(first, second)`; `None` if they are equal.

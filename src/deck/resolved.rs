@@ -344,11 +344,13 @@ fn results(w: &mut Writer, deck: &Deck) {
         w.line("verify", "scale", number(verify.scale));
     }
     w.table("[output]");
-    let every = match deck.output.every {
+    let interval = |every: Every| match every {
         Every::Steps(steps) => steps.to_string(),
         Every::Seconds(seconds) => inline(&[("seconds", number(seconds))]),
     };
-    w.line("output", "every", every);
+    w.line("output", "every", interval(deck.output.every));
+    w.line("output", "history", interval(deck.output.history));
+    w.line("output", "log", interval(deck.output.log(deck.analysis.kind)));
     w.line("output", "fields", array(deck.output.fields.iter().map(|field| quote(field))));
     if let Some(checkpoint) = &deck.output.checkpoint {
         let mut pairs = Vec::new();

@@ -182,6 +182,27 @@ pub fn find<const D: usize>(
     })))
 }
 
+/// A run that is made shorter has to end behind its checkpoint. Error: exit code 3.
+pub fn require_room<const D: usize>(deck: &Deck, found: &Restored<D>) -> Result<()> {
+    let analysis = &deck.analysis;
+    let behind = match (analysis.steps, analysis.duration) {
+        (Some(steps), _) => (found.step > steps).then(|| format!("analysis.steps = {steps}")),
+        (None, Some(duration)) => {
+            let time = found.state.number("time_steps.time").unwrap_or(0.0);
+            (time > duration * (1.0 + 1e-12)).then(|| format!("analysis.duration = {duration} s"))
+        }
+        (None, None) => None,
+    };
+    match behind {
+        None => Ok(()),
+        Some(end) => Err(Error::File(error_text(&format!(
+            "{} was written after step {}, behind the end of this deck ({end})",
+            found.path.display(),
+            found.step
+        )))),
+    }
+}
+
 fn error_text(text: &str) -> String {
     format!("{text}\nnothing was changed")
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use crate::cli::Voice;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every};
 use crate::error::{Error, Result};
@@ -19,7 +20,7 @@ use crate::output::tables::history::History;
 use crate::output::tables::history::{HistoryRow, Layout};
 use crate::output::tables::residuals::Residuals;
 use crate::output::terminal::log::Log;
-use crate::output::terminal::progress::{NewtonReport, Progress, StepReport};
+use crate::output::terminal::progress::{Interval, NewtonReport, Progress, StepReport};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::numbering::Numbering;
@@ -40,6 +41,12 @@ pub struct Recorder {
     progress: Progress,
     every: Every,
     last_frame: f64,
+    /// Between rows of the history.
+    rows_every: Every,
+    /// Time, or load factor, of the last row.
+    last_row: f64,
+    /// Of steps since the last row.
+    since_row: SinceRow,
     steps: Option<usize>,
     pub newton: Count,
     pub linear: Count,
@@ -65,6 +72,14 @@ pub struct Recorder {
     earlier_seconds: f64,
     /// s up to the last row, earlier parts included.
     seconds: f64,
+}
+
+/// Counts of the steps that have no row of their own: the next row takes them.
+#[derive(Debug, Clone, Copy, Default)]
+struct SinceRow {
+    newton: usize,
+    linear: usize,
+    moved: f64,
 }
 
 /// What a restart hands to the recorder.
@@ -104,6 +119,7 @@ impl Ending {
 impl Recorder {
     /// The files of a results directory: fresh ones, or those of the run that is resumed, which are
     /// read and tested. Nothing is written before [`Self::open`].
+    #[allow(clippy::too_many_arguments)]
     pub fn create(
         world: &World,
         deck: &Deck,
@@ -112,6 +128,7 @@ impl Recorder {
         versions: BTreeMap<String, String>,
         checkpointer: Checkpointer,
         resume: Option<Resume>,
+        voice: Voice,
     ) -> Result<Self> {
         let comm = world.comm();
         let layout = Layout {
@@ -148,6 +165,11 @@ impl Recorder {
             }
         };
         let same_directory = goes_on.is_some();
+        let interval = match deck.output.log(deck.analysis.kind) {
+            _ if voice == Voice::Verbose => Interval::Steps(1),
+            Every::Steps(steps) => Interval::Steps(steps),
+            Every::Seconds(seconds) => Interval::Seconds(seconds),
+        };
         let mut recorder = Recorder {
             log,
             history,
@@ -155,9 +177,12 @@ impl Recorder {
             points,
             grid,
             directory,
-            progress: Progress::default(),
+            progress: Progress::new(interval, 0.0, 0.0),
             every: deck.output.every,
             last_frame: 0.0,
+            rows_every: deck.output.history,
+            last_row: 0.0,
+            since_row: SinceRow::default(),
             steps: deck.analysis.steps,
             newton: Count::default(),
             linear: Count::default(),
@@ -288,10 +313,14 @@ impl Recorder {
             ("recorder.linear_total", self.linear.total),
             ("recorder.linear_max", self.linear.max),
             ("recorder.populated_cells", self.populated_cells),
+            ("recorder.newton_since_row", self.since_row.newton),
+            ("recorder.linear_since_row", self.since_row.linear),
         ] {
             state.set_count(name, value as u64);
         }
         state.set("recorder.last_frame", self.last_frame);
+        state.set("recorder.last_row", self.last_row);
+        state.set("recorder.moved_since_row", self.since_row.moved);
         state.set("recorder.imbalance", self.imbalance);
         state.set("recorder.seconds", self.seconds);
     }
@@ -307,6 +336,13 @@ impl Recorder {
             Count { total: count("recorder.linear_total")?, max: count("recorder.linear_max")? };
         self.populated_cells = count("recorder.populated_cells")?;
         self.last_frame = state.number("recorder.last_frame")?;
+        // Not known to the first checkpoints of this format, whose steps all have rows.
+        self.last_row = state.number("recorder.last_row").unwrap_or(0.0);
+        self.since_row = SinceRow {
+            newton: count("recorder.newton_since_row").unwrap_or(0),
+            linear: count("recorder.linear_since_row").unwrap_or(0),
+            moved: state.number("recorder.moved_since_row").unwrap_or(0.0),
+        };
         self.imbalance = state.number("recorder.imbalance")?;
         self.earlier_seconds = state.number("recorder.seconds")?;
         self.seconds = self.earlier_seconds;
@@ -317,11 +353,30 @@ impl Recorder {
         self.directory.path().to_path_buf()
     }
 
-    /// Records one accepted step (or part of one): a row and a line.
-    pub fn step(&mut self, world: &World, row: &HistoryRow, with_newton: bool) -> Result<()> {
+    /// Records one accepted step (or part of one): a row and a line, where the deck's intervals
+    /// want them. A step that ends the run, for whatever reason, is a [`Moment::End`].
+    pub fn step(
+        &mut self,
+        world: &World,
+        row: &HistoryRow,
+        with_newton: bool,
+        moment: Moment,
+    ) -> Result<()> {
         self.seconds = self.earlier_seconds + row.wall_seconds;
-        let whole_run = HistoryRow { wall_seconds: self.seconds, ..row.clone() };
-        self.history.push(&whole_run, world.comm())?;
+        self.since_row.newton += row.newton_iterations;
+        self.since_row.linear += row.linear_iterations;
+        self.since_row.moved += row.moved_points;
+        if self.wants_row(row, moment) {
+            let SinceRow { newton, linear, moved } = std::mem::take(&mut self.since_row);
+            let whole = HistoryRow {
+                newton_iterations: newton,
+                linear_iterations: linear,
+                moved_points: moved,
+                wall_seconds: self.seconds,
+                ..row.clone()
+            };
+            self.history.push(&whole, world.comm())?;
+        }
         self.watch_boundaries(row);
         self.recorded = row.step;
         self.reached = (row.load_factor, row.time);
@@ -340,6 +395,7 @@ impl Recorder {
             time: (row.time > 0.0).then_some(row.time),
             newton,
             elapsed: row.wall_seconds,
+            last: moment == Moment::End,
         };
         self.progress.step(&mut self.log, &report);
         Ok(())
@@ -361,6 +417,20 @@ impl Recorder {
             let detail = format!("(reaction.{name}.held is {held:.3e}, {first:.3e} at first)");
             self.log.warn_of_step(row.step, &text, &detail);
         }
+    }
+
+    fn wants_row(&mut self, row: &HistoryRow, moment: Moment) -> bool {
+        let time = if row.time > 0.0 { row.time } else { row.load_factor };
+        let wanted = match self.rows_every {
+            Every::Steps(1) => true,
+            Every::Steps(every) => moment == Moment::Step && row.step.is_multiple_of(every.max(1)),
+            Every::Seconds(seconds) => time >= self.last_row + seconds * (1.0 - 1e-9),
+        };
+        let wanted = wanted || moment == Moment::End;
+        if wanted {
+            self.last_row = time;
+        }
+        wanted
     }
 
     /// A step that could be solved but not written is not a completed one.

@@ -73,6 +73,9 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     world.fail_together(known::require_known())?;
     files::require_writable(world.comm())?;
     let mut log = Log::new(world.comm());
+    if arguments.voice == cli::Voice::Quiet {
+        log.be_quiet();
+    }
     let versions = versions();
     log.say(&report::banner(&Banner {
         version: env!("CARGO_PKG_VERSION").into(),
@@ -148,6 +151,7 @@ impl Run<'_> {
             }
             Some(choice) => {
                 let found = checkpointing::find::<D>(world, &physics, choice, out, &mut self.log)?;
+                checkpointing::require_room(&deck, &found)?;
                 self.log.say(&report::restart(&found.path, found.step, found.ranks, world.size()));
                 let resume = Resume {
                     state: found.state.clone(),
@@ -192,8 +196,9 @@ impl Run<'_> {
         };
         let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
         let (log, versions, into) = (self.log, self.versions, directory.clone());
+        let voice = self.arguments.voice;
         let mut recorder =
-            Recorder::create(world, &model.deck, into, log, versions, checkpointer, resume)?;
+            Recorder::create(world, &model.deck, into, log, versions, checkpointer, resume, voice)?;
         // All of the earlier part is known to fit: now it may be changed.
         if let (Some((used, step)), Some(choice)) = (earlier, &self.arguments.restart) {
             checkpointing::set_later_aside(world, out, choice, &used, step)?;

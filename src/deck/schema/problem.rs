@@ -239,6 +239,20 @@ pub const RESULT_SECTIONS: &[Section] = &[
                 "Interval between outputs.",
             ),
             key(
+                "history",
+                Special("a whole number of steps, or { seconds = s }"),
+                Default("1"),
+                "Interval between rows of `history.csv`. A row tells of its own step; iterations and \
+                 moved points are sums since the row before. The last step always has a row.",
+            ),
+            key(
+                "log",
+                Special("a whole number of steps, or { seconds = s }"),
+                Optional("explicit: one second, others: one step"),
+                "Interval between lines on the terminal and in `log.txt`. The first and the last step \
+                 always have a line; `--verbose` shows all.",
+            ),
+            key(
                 "fields",
                 Choices(FIELD_NAMES),
                 Default("[\"displacement\", \"stress\", \"plastic_strain\"]"),
@@ -259,6 +273,27 @@ pub const RESULT_SECTIONS: &[Section] = &[
         )
         .unit("s")
         .range(POSITIVE)],
+    },
+    Section {
+        name: "output.history",
+        header: "output.history",
+        doc: "An interval of time instead of steps.",
+        keys: &[key(
+            "seconds",
+            Number,
+            Required,
+            "Simulated time between rows; without a time, of the load factor.",
+        )
+        .unit("s")
+        .range(POSITIVE)],
+    },
+    Section {
+        name: "output.log",
+        header: "output.log",
+        doc: "An interval of time instead of steps.",
+        keys: &[key("seconds", Number, Required, "Wall time between lines.")
+            .unit("s")
+            .range(POSITIVE)],
     },
     Section {
         name: "output.checkpoint",

@@ -71,7 +71,9 @@ fn exact(table: &Table<'_>, field: &str, components: usize) -> Got<Vec<Expressio
 }
 
 pub fn output(table: &Table<'_>) -> Got<Output> {
-    let every = every(table);
+    let every = interval(table, "every", "output.every");
+    let history = interval(table, "history", "output.history");
+    let log = interval(table, "log", "output.log");
     let fields = table.choices("fields", FIELD_NAMES);
     let checkpoint = table.table_if("checkpoint", |t| {
         let (every, minutes, keep) = (t.count_if("every"), t.number_if("minutes"), t.count("keep"));
@@ -83,23 +85,30 @@ pub fn output(table: &Table<'_>) -> Got<Output> {
         Ok(Checkpoint { every: every?, minutes: minutes?, keep: keep? })
     });
     let fields = fields?.into_iter().map(|at| FIELD_NAMES[at].to_string()).collect();
-    Ok(Output { every: every?, fields, checkpoint: checkpoint? })
+    Ok(Output {
+        every: every?.unwrap_or(Every::Steps(1)),
+        history: history?.unwrap_or(Every::Steps(1)),
+        log: log?,
+        fields,
+        checkpoint: checkpoint?,
+    })
 }
 
-fn every(table: &Table<'_>) -> Got<Every> {
-    let Some(node) = table.node("every") else { return Ok(Every::Steps(1)) };
+/// A whole number of steps, or a table with seconds.
+fn interval(table: &Table<'_>, key: &str, section: &str) -> Got<Option<Every>> {
+    let Some(node) = table.node(key) else { return Ok(None) };
     match &node.value {
         Value::Table(_) => {
-            let path = table.full("every");
-            let section = schema::section("output.every");
+            let path = table.full(key);
+            let section = schema::section(section);
             let time = Table::open(table.problems(), section, &path, node)?;
-            Ok(Every::Seconds(time.number("seconds")?))
+            Ok(Some(Every::Seconds(time.number("seconds")?)))
         }
         Value::Integer(_) => {
-            let steps = table.number_from("every", node, at_least(1.0))?;
-            Ok(Every::Steps(steps as usize))
+            let steps = table.number_from(key, node, at_least(1.0))?;
+            Ok(Some(Every::Steps(steps as usize)))
         }
-        _ => Err(table.wrong("every", node)),
+        _ => Err(table.wrong(key, node)),
     }
 }
 

@@ -174,10 +174,17 @@ impl Refusal {
     }
 }
 
+/// Why more steps are not always taken.
+const EXTENDING: &str = "\n    why: loads, displacements and rotations that are totals over the whole \
+    analysis would mean something else\n    try: the steps of the checkpoint; a dynamic run can be \
+    extended where its motions and loads are formulas of t, without s";
+
 fn foreign(theirs: &str, ours: &str) -> String {
     match crate::deck::physics::difference(theirs, ours) {
         Some((theirs, ours)) => {
-            format!("it was written with `{theirs}` where this deck has `{ours}`")
+            let longer = theirs.starts_with("steps = ") || theirs.starts_with("duration = ");
+            let why = if longer { EXTENDING } else { "" };
+            format!("it was written with `{theirs}` where this deck has `{ours}`{why}")
         }
         None => "its deck differs".into(),
     }

@@ -20,6 +20,8 @@ const ERASE_LINE: &str = "\r\x1b[2K";
 pub struct Log {
     speaks: bool,
     on_terminal: bool,
+    /// The terminal shows warnings only.
+    quiet: bool,
     /// A line without an end stands on the terminal.
     transient: bool,
     unwritten: String,
@@ -33,6 +35,7 @@ impl Log {
         Self {
             speaks,
             on_terminal: speaks && stdout_is_terminal(),
+            quiet: false,
             transient: false,
             unwritten: String::new(),
             file: None,
@@ -45,6 +48,7 @@ impl Log {
         Self {
             speaks: false,
             on_terminal: false,
+            quiet: false,
             transient: false,
             unwritten: String::new(),
             file: None,
@@ -71,6 +75,12 @@ impl Log {
             self.unwritten.clear();
             Ok(())
         })
+    }
+
+    /// From here on the terminal shows warnings only; the file keeps everything.
+    pub fn be_quiet(&mut self) {
+        self.quiet = true;
+        self.on_terminal = false;
     }
 
     pub fn on_terminal(&self) -> bool {
@@ -108,7 +118,7 @@ impl Log {
 
     /// Says `text` on the terminal only.
     pub fn show(&mut self, text: &str) {
-        if self.speaks {
+        if self.speaks && (!self.quiet || text.starts_with("warning")) {
             let erase = if std::mem::take(&mut self.transient) { ERASE_LINE } else { "" };
             // Nobody listens to a closed pipe; the run and its files go on.
             let mut out = std::io::stdout().lock();

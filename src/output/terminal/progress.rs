@@ -1,10 +1,10 @@
-//! One line per step: where the run is, how the solver did, how long it will still take.
+//! Lines for steps: where the run is, how the solver did, how long it will still take.
 
 use super::log::Log;
 use super::report::{duration, fixed_width};
 
 /// Shortest time between two lines that stay on a terminal, s.
-const LINE_EVERY: f64 = 0.2;
+const LINE_EVERY: f64 = 1.0;
 /// Shortest time between two changes of the line that moves, s.
 const CHANGE_EVERY: f64 = 0.05;
 
@@ -22,6 +22,8 @@ pub struct StepReport {
     pub newton: Option<NewtonReport>,
     /// s since the start of the run.
     pub elapsed: f64,
+    /// The last one, or one that ends the run.
+    pub last: bool,
 }
 
 /// How the solution of a step went.
@@ -34,9 +36,21 @@ pub struct NewtonReport {
     pub cuts: usize,
 }
 
-/// Prints the steps: all of them in a file, no more than a reader can follow on a terminal.
-#[derive(Debug, Default)]
+/// Which steps have a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Interval {
+    Steps(usize),
+    /// s of wall time
+    Seconds(f64),
+}
+
+/// Prints the steps at an interval, the first and the last one in any case; on a terminal no more
+/// than a reader can follow.
+#[derive(Debug)]
 pub struct Progress {
+    interval: Interval,
+    /// s at the last step with a line.
+    last_due: Option<f64>,
     started: Option<(f64, f64)>,
     last_line: Option<f64>,
     last_change: f64,
@@ -45,8 +59,25 @@ pub struct Progress {
 
 impl Progress {
     /// `share` and `elapsed` (s) of the run at the first step: not zero after a restart.
-    pub fn new(share: f64, elapsed: f64) -> Self {
-        Self { started: Some((share, elapsed)), ..Self::default() }
+    pub fn new(interval: Interval, share: f64, elapsed: f64) -> Self {
+        Self {
+            interval,
+            last_due: None,
+            started: Some((share, elapsed)),
+            last_line: None,
+            last_change: 0.0,
+            headed: false,
+        }
+    }
+
+    /// Whether the step has a line in the log.
+    fn due(&self, report: &StepReport) -> bool {
+        let Some(last) = self.last_due else { return true };
+        report.last
+            || match self.interval {
+                Interval::Steps(steps) => report.step.is_multiple_of(steps.max(1)),
+                Interval::Seconds(seconds) => report.elapsed - last >= seconds,
+            }
     }
 
     pub fn step(&mut self, log: &mut Log, report: &StepReport) {
@@ -54,13 +85,17 @@ impl Progress {
             log.say(&heading(report));
         }
         let line = line(report, self.left(report));
-        log.note(&line);
+        let due = self.due(report);
+        if due {
+            log.note(&line);
+            self.last_due = Some(report.elapsed);
+        }
         let quiet_for = report.elapsed - self.last_line.unwrap_or(f64::NEG_INFINITY);
-        if !log.on_terminal() || quiet_for >= LINE_EVERY || report.share >= 1.0 {
+        if due && (!log.on_terminal() || quiet_for >= LINE_EVERY || report.last) {
             log.show(&line);
             self.last_line = Some(report.elapsed);
             self.last_change = report.elapsed;
-        } else if report.elapsed - self.last_change >= CHANGE_EVERY {
+        } else if log.on_terminal() && report.elapsed - self.last_change >= CHANGE_EVERY {
             log.show_briefly(&line);
             self.last_change = report.elapsed;
         }
@@ -123,8 +158,9 @@ mod tests {
             time: None,
             newton: Some(newton),
             elapsed: 12.0,
+            last: false,
         };
-        let left = Progress::new(0.0, 2.0).left(&report);
+        let left = Progress::new(Interval::Steps(1), 0.0, 2.0).left(&report);
         assert_eq!(left, Some(90.0), "10 s for a tenth");
         assert_eq!(
             format!("{}\n{}", heading(&report), line(&report, left)),
@@ -142,8 +178,28 @@ mod tests {
     fn a_restart_does_not_count_what_others_did() {
         let report = StepReport { share: 0.6, elapsed: 30.0, ..Default::default() };
         // a tenth took 20 s, four are left
-        let left = Progress::new(0.5, 10.0).left(&report).unwrap();
+        let left = Progress::new(Interval::Steps(1), 0.5, 10.0).left(&report).unwrap();
         approx::assert_relative_eq!(left, 80.0, max_relative = 1e-12);
-        assert_eq!(Progress::new(0.6, 30.0).left(&report), None);
+        assert_eq!(Progress::new(Interval::Steps(1), 0.6, 30.0).left(&report), None);
+    }
+
+    #[test]
+    fn the_interval_bounds_the_lines() {
+        // Steps of 1/64 s, which are exact.
+        let lines = |interval| {
+            let (mut progress, mut due) = (Progress::new(interval, 0.0, 0.0), Vec::new());
+            for step in 1..=200 {
+                let elapsed = step as f64 / 64.0;
+                let report = StepReport { step, elapsed, last: step == 200, ..Default::default() };
+                if progress.due(&report) {
+                    due.push(step);
+                    progress.last_due = Some(elapsed);
+                }
+            }
+            due
+        };
+        assert_eq!(lines(Interval::Seconds(1.0)), [1, 65, 129, 193, 200]);
+        assert_eq!(lines(Interval::Steps(90)), [1, 90, 180, 200]);
+        assert_eq!(lines(Interval::Steps(1)).len(), 200);
     }
 }
