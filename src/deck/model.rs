@@ -413,22 +413,12 @@ pub struct Output {
     pub every: Every,
     /// Between rows of the history.
     pub history: Every,
-    /// Between lines on the terminal and in the log; seconds of wall time. See [`Output::log`].
-    pub log: Option<Every>,
+    /// Between lines on the terminal and in the log; seconds of wall time. By default one a second
+    /// in explicit analyses, whose steps are short, and one a step in others.
+    pub log: Every,
     /// Point fields to write.
     pub fields: Vec<String>,
     pub checkpoint: Option<Checkpoint>,
-}
-
-impl Output {
-    /// Between lines on the terminal and in the log: by default one a second in explicit analyses,
-    /// whose steps are short, and one a step in others.
-    pub fn log(&self, kind: AnalysisType) -> Every {
-        self.log.unwrap_or(match kind {
-            AnalysisType::Explicit => Every::Seconds(1.0),
-            _ => Every::Steps(1),
-        })
-    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -21,7 +21,7 @@ pub fn physics(deck: &Deck) -> String {
     deck.output = Output {
         every: Every::Steps(1),
         history: Every::Steps(1),
-        log: None,
+        log: Every::Steps(1),
         fields: Vec::new(),
         checkpoint: None,
     };

@@ -350,7 +350,7 @@ fn results(w: &mut Writer, deck: &Deck) {
     };
     w.line("output", "every", interval(deck.output.every));
     w.line("output", "history", interval(deck.output.history));
-    w.line("output", "log", interval(deck.output.log(deck.analysis.kind)));
+    w.line("output", "log", interval(deck.output.log));
     w.line("output", "fields", array(deck.output.fields.iter().map(|field| quote(field))));
     if let Some(checkpoint) = &deck.output.checkpoint {
         let mut pairs = Vec::new();

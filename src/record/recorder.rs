@@ -165,7 +165,7 @@ impl Recorder {
             }
         };
         let same_directory = goes_on.is_some();
-        let interval = match deck.output.log(deck.analysis.kind) {
+        let interval = match deck.output.log {
             _ if voice == Voice::Verbose => Interval::Steps(1),
             Every::Steps(steps) => Interval::Steps(steps),
             Every::Seconds(seconds) => Interval::Seconds(seconds),

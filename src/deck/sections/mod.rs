@@ -39,7 +39,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let method = root
         .table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok(), kind));
     let materials = bodies::materials(&root, kind);
-    let output = root.table_or_default("output", |table| results::output(&table));
+    let output = root.table_or_default("output", |table| results::output(&table, kind));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = results::petsc(&root);
     // Without the grid the dimension is unknown, and nothing below can be judged.

@@ -2,7 +2,7 @@
 
 use crate::deck::expression::Expression;
 use crate::deck::fields::{FIELD_NAMES, FIELDS, FieldRank};
-use crate::deck::model::{Checkpoint, Every, Output, Parallel, Verify};
+use crate::deck::model::{AnalysisType, Checkpoint, Every, Output, Parallel, Verify};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{self, at_least};
@@ -70,7 +70,7 @@ fn exact(table: &Table<'_>, field: &str, components: usize) -> Got<Vec<Expressio
     }
 }
 
-pub fn output(table: &Table<'_>) -> Got<Output> {
+pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
     let every = interval(table, "every", "output.every");
     let history = interval(table, "history", "output.history");
     let log = interval(table, "log", "output.log");
@@ -88,7 +88,10 @@ pub fn output(table: &Table<'_>) -> Got<Output> {
     Ok(Output {
         every: every?.unwrap_or(Every::Steps(1)),
         history: history?.unwrap_or(Every::Steps(1)),
-        log: log?,
+        log: log?.unwrap_or(match kind {
+            Some(AnalysisType::Explicit) => Every::Seconds(1.0),
+            _ => Every::Steps(1),
+        }),
         fields,
         checkpoint: checkpoint?,
     })
