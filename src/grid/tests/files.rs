@@ -157,16 +157,16 @@ fn wrong_entities_are_named() {
     refused::<2>(good.replace("\n6\n", "\n7\n"), &["node", "twice"]);
 }
 
+/// Area or volume of a tag's cells, and the places of its nodes.
+type Tagged<const D: usize> = (f64, Vec<[f64; D]>);
+
 /// Cells, their area or volume by tag, and places of the nodes of each tag.
-fn picture<const D: usize>(
-    mesh: &Mesh<D>,
-    tags: &[&str],
-) -> (usize, usize, Vec<(f64, Vec<[f64; D]>)>) {
+fn picture<const D: usize>(mesh: &Mesh<D>, tags: &[&str]) -> (usize, usize, Vec<Tagged<D>>) {
     let by_tag = tags.iter().map(|tag| {
         let cells = mesh.tagged_cells(tag).unwrap_or_default();
-        let content = cells.iter().map(|&cell| mesh.cell_volume(cell as usize)).sum();
+        let content = cells.iter().map(|&cell| mesh.cell_volume(cell)).sum();
         let nodes = mesh.tagged_nodes(tag).unwrap();
-        let mut places: Vec<_> = nodes.iter().map(|&n| mesh.node_position(n as usize)).collect();
+        let mut places: Vec<_> = nodes.iter().map(|&n| mesh.node_position(n)).collect();
         // By places without their last digits, which differ between text and binary files.
         places.sort_by_key(|x| x.map(|x| (x * 1e9).round() as i64));
         (content, places)
