@@ -163,7 +163,14 @@ fn gimp_is_the_mean_of_the_hats() {
         for r in [0.05, 0.25, 0.4, 0.5, 0.6, 1.0, 1.37] {
             let t = [0.171 * i as f64, 0.117 * i as f64];
             let points = points_at::<2>(&[(t, [r, 0.8 * r])]);
-            let influences = map(Basis::Gimp, &points);
+            // Over the edge too, where the hats of the grid's own nodes are all there is.
+            let influences = map_points_with(
+                &Grid::Lattice(lattice()),
+                Basis::Gimp,
+                GimpEdge::Published,
+                &points,
+            )
+            .expect("all points are inside");
             for e in influences.row(0) {
                 let node = grid.node_index(influences.nodes[e]);
                 let (sx, gx) = mean_of_hat(node[0] as f64, t[0], r);
