@@ -61,7 +61,7 @@ const USAGE: &str = "mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out 
     after_help = "Words with one dash, and their values, go to PETSc: -qs_ for equilibrium, -mass_ for mass solves.\nExit codes: 0 done, 1 the run failed, 2 bad input, 3 restart or file problem, 4 environment."
 )]
 struct Words {
-    /// The deck
+    /// The deck; - reads it from standard input
     #[arg(value_name = "INPUT.toml")]
     input: PathBuf,
     /// Change a key of the deck by its dotted path; the value is TOML
@@ -85,13 +85,16 @@ struct Words {
     /// Show every step
     #[arg(long)]
     verbose: bool,
-    /// Print help
+    /// Print help (also -h)
     #[arg(long, action = clap::ArgAction::Help)]
     help: Option<bool>,
-    /// Print version
+    /// Print version (also -V)
     #[arg(long, action = clap::ArgAction::Version)]
     version: Option<bool>,
 }
+
+/// The deck's name that stands for standard input.
+pub const STANDARD_INPUT: &str = "-";
 
 /// Options of ours that take the next word.
 const WITH_VALUE: [&str; 3] = ["--set", "--out", "--restart"];
@@ -139,6 +142,9 @@ fn bad_usage(message: &str) -> String {
 }
 
 fn default_out(input: &Path) -> PathBuf {
+    if input == Path::new(STANDARD_INPUT) {
+        return Path::new("out").join("stdin");
+    }
     Path::new("out").join(input.file_stem().unwrap_or(input.as_os_str()))
 }
 
@@ -152,7 +158,11 @@ fn divide(args: impl IntoIterator<Item = OsString>) -> Result<(Vec<OsString>, Ve
     let mut deck_named = false;
     while let Some(word) = args.next() {
         let text = word.to_string_lossy().into_owned();
-        if text.starts_with("--") {
+        if ["-h", "-V"].contains(&text.as_str()) {
+            // Ours in short, not PETSc's, wherever they stand.
+            ours.push(if text == "-h" { "--help".into() } else { "--version".into() });
+            after_petsc_option = false;
+        } else if text.starts_with("--") {
             let takes_next = WITH_VALUE.contains(&text.as_str());
             ours.push(word);
             ours.extend(takes_next.then(|| args.next()).flatten());
@@ -231,6 +241,12 @@ mod tests {
     }
 
     #[test]
+    fn a_dash_is_standard_input() {
+        let a = read("- --set a=1 -log_view").expect("valid");
+        assert_eq!((a.input.as_path(), a.out.as_path()), (Path::new("-"), Path::new("out/stdin")));
+    }
+
+    #[test]
     fn bad_usage_is_bad_input() {
         for (line, part) in [
             ("", "INPUT.toml"),
@@ -261,6 +277,11 @@ mod tests {
         assert!(help.contains("--restart <FILE|last>") && help.contains("Exit codes: 0 done"));
         let version = read("--version").expect("valid").print.expect("text");
         assert_eq!(version.trim_end(), concat!("mpm-par ", env!("CARGO_PKG_VERSION")));
+        for (word, text) in [("-h", &help), ("-V", &version)] {
+            for line in [word.to_string(), format!("deck.toml -log_view {word}")] {
+                assert_eq!(read(&line).expect("valid").print.as_ref(), Some(text), "{line}");
+            }
+        }
         // PETSc has a help of its own.
         assert_eq!(read("deck.toml -help").expect("valid").petsc, ["-help"]);
     }

@@ -63,7 +63,8 @@ beam.toml:29:1: material.steel.density: unknown key \"density\"
  29 | density = 1
     | ^^^^^^^
    = \"density\" belongs to [[body]]
-   = known keys of [material.NAME]: model, young, poisson, yield"
+   = known keys of [material.NAME]: model, young, poisson, yield, yield_stress, \
+shear_strength"
     );
 }
 
@@ -186,6 +187,65 @@ fn options_are_named_in_messages() {
     );
 }
 
+/// Every key of the schema that only some choices read is refused with the others, in the deck and
+/// from the command line, and a key of the deck is set aside where an option makes the choice.
+#[test]
+fn keys_of_no_effect_are_refused_with_the_choice_that_reads_them() {
+    for (text, key, value, what) in [
+        (BEAM, "method.stress_update", "\"usf\"", "analysis.type = \"explicit\" reads it"),
+        (BEAM, "method.mass", "\"lumped\"", "\"explicit\" or \"implicit-dynamic\" reads it"),
+        (BEAM, "analysis.newmark_beta", "0.25", "\"implicit-dynamic\" reads it"),
+        (BEAM, "body.0.velocity", "[1, 0]", "\"explicit\" or \"implicit-dynamic\" reads it"),
+        (BEAM, "ghost.mass_factor", "1.0", "found \"quasi-static\""),
+        (COLLISION, "analysis.tolerance", "1e-6", "\"quasi-static\" or \"implicit-dynamic\" reads"),
+        (COLLISION, "analysis.max_iterations", "7", "found \"explicit\""),
+        (COLLISION, "method.frame", "\"total\"", "found \"explicit\""),
+        (CUBE, "method.domain_update", "\"corners\"", "method.basis = \"gimp\" reads it, found"),
+        (
+            CUBE,
+            "analysis.smallest_step",
+            "0.5",
+            "analysis.on_failure = \"cut\" reads it, found \"stop\"",
+        ),
+        (ANNULUS, "parallel.brick", "4", "grid.type = \"lattice\" reads it, found \"mesh\""),
+    ] {
+        let found = message(text, &[&format!("{key}={value}")]);
+        assert!(found.contains(&format!("{key}: has no effect: only")), "{found}");
+        assert!(found.contains(what), "{key}: {found}");
+    }
+    let text = BEAM.replacen("[method]", "[method]\nstress_update = \"usl\"", 1);
+    let found = message(&text, &[]);
+    assert!(found.contains("method.stress_update: has no effect"), "{found}");
+}
+
+#[test]
+fn a_key_of_the_deck_is_set_aside_where_an_option_makes_the_choice() {
+    let sets = ["method.basis=mpm".to_string()];
+    let deck = deck::read(Path::new("beam.toml"), BEAM, &sets).expect("a good deck");
+    assert_eq!(
+        deck.notes,
+        [
+            "note: method.domain_update of the deck has no effect with --set method.basis=mpm and is set aside"
+        ]
+    );
+    let found = message(BEAM, &["method.basis=mpm", "method.domain_update=corners"]);
+    assert!(found.contains("only method.basis = \"gimp\" reads it, found \"mpm\""), "{found}");
+}
+
+#[test]
+fn a_weightless_body_beside_heavy_ones_is_meant_to_be() {
+    let heavy = "body.0.density=1000";
+    let gravity = "load=[{ gravity = [0, -10] }]";
+    let second = "[[body]]\nname = \"light\"\nmaterial = \"steel\"\n\
+                  shape = { box = { min = [0, 0], max = [1, 1] } }\n";
+    let at = BEAM.find("[[boundary]]").expect("a boundary");
+    let text = format!("{}{second}{}", &BEAM[..at], &BEAM[at..]);
+    let found = message(&text, &[heavy, gravity]);
+    assert!(found.contains("body \"light\" has no density, and others have one"), "{found}");
+    let sets = [heavy, gravity, "body.1.density=0.0"].map(String::from);
+    deck::read(Path::new("beam.toml"), &text, &sets).expect("density = 0.0 says so");
+}
+
 #[test]
 fn several_problems_are_told_at_once_in_the_order_of_the_text() {
     let text = BEAM
@@ -236,17 +296,34 @@ fn checks_of_the_analysis_and_the_method() {
                 "only for analysis.type = \"conditioning\", found \"quasi-static\"",
             ),
             (
-                &["method.velocity_update=1.5"],
+                &["method.velocity_update=0.5"],
+                "only analysis.type = \"explicit\" or \"implicit-dynamic\" reads it, found \"quasi-static\"",
+            ),
+            (
+                &["analysis.type=explicit", "analysis.duration=1", "method.velocity_update=1.5"],
                 "number from 0 (pic) to 1 (flip) >= 0 and <= 1, found 1.5",
             ),
-            (&["method.velocity_update=flop"], "did you mean \"flip\"?"),
-            (&["method.position_update=publisht"], "did you mean \"published\"?"),
-            (&["method.point_volume=domain", "method.basis=mpm"], "is for basis = \"gimp\""),
+            (&["analysis.type=explicit", "method.velocity_update=flop"], "did you mean \"flip\"?"),
+            (
+                &["analysis.type=explicit", "method.position_update=publisht"],
+                "did you mean \"published\"?",
+            ),
+            (
+                &["method.point_volume=domain", "method.basis=mpm"],
+                "only method.basis = \"gimp\" reads it",
+            ),
             (&["method.position_updates=published"], "did you mean \"position_update\"?"),
-            (&["method.xpic_order=3"], "only with velocity_update = \"xpic\""),
+            (
+                &["method.xpic_order=3"],
+                "only method.velocity_update = \"xpic\" reads it, found \"flip\"",
+            ),
             (&["ghost.stiffness_factor=1"], "stiffness is given too"),
             (&["ghost=on"], "ghost: expected \"off\", found \"on\""),
             (&["ghost=false"], "ghost: expected a table or \"off\", found false"),
+            (
+                &["output.fields=[\"stres\", \"strain\", \"stress\"]"],
+                "found \"stres\"\n   = did you mean \"stress\"?\n--set",
+            ),
             (&["parallel.rebalance_above=0.5"], "expected 0 (never) or a number >= 1"),
             (&["petsc.a=[1]"], "petsc.a: expected a string, number or true"),
             (&["output.fields=[\"stresses\"]"], "did you mean \"stress\"?"),
@@ -276,6 +353,10 @@ fn checks_of_the_analysis_and_the_method() {
         COLLISION,
         &[
             (&["analysis.steps=10"], "steps and cfl exclude each other"),
+            (
+                &["material.soft.young=0"],
+                "without stiffness there is no stability limit for cfl to divide",
+            ),
             (&["analysis.cfl="], "analysis.steps: missing a whole number >= 1; or give cfl"),
         ],
     );
@@ -329,12 +410,28 @@ fn checks_of_bodies_and_shapes() {
             (&["material.steel.yield=1"], "only for model = \"von-mises\""),
             (
                 &["material.steel.model=von-mises"],
-                "material.steel.yield: missing a number > 0; model = \"von-mises\" needs it",
+                "material.steel.yield: missing a number > 0; model = \"von-mises\" needs it, or \
+                 yield_stress (uniaxial), or shear_strength",
             ),
+            (
+                &[
+                    "material.steel.model=von-mises",
+                    "material.steel.yield=1",
+                    "material.steel.shear_strength=1",
+                ],
+                "expected only one of \"yield\", \"shear_strength\"",
+            ),
+            (&["material.steel.shear_strength=1"], "only for model = \"von-mises\""),
             (&["material.steel.poisson=-1"], "expected a number > -1 and < 0.5"),
             (&["material=7"], "material: expected tables, each under a name of its own, found 7"),
             (&["body.0.material=stel"], "expected \"steel\", found \"stel\""),
             (&["body="], "body: missing an array of tables; expected a [[body]]"),
+            (&["body={ name = \"a\" }"], "write [[body]], in double brackets"),
+            (
+                &["body.0.density=2e100"],
+                "expected at most 1e100, so that energies and sums stay finite",
+            ),
+            (&["material.steel.young=1e300"], "expected at most 1e100"),
             (&["body.0.density=-1"], "body.0.density: expected a number >= 0 (kg/m3), found -1"),
             (&["body.0.points_per_cell=[2]"], "expected 2 values, one per axis"),
             (

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use mpm_par::deck::model::*;
 use mpm_par::deck::{self, Deck};
+use mpm_par::material::Material;
 
 const BEAM: &str = include_str!("decks/beam.toml");
 const DYNAMIC: &str = include_str!("decks/collision.toml");
@@ -78,7 +79,7 @@ fn ghost_is_on_unless_it_is_turned_off() {
         (BEAM, &["ghost=off"], None),
         (BEAM, &["ghost=\"off\""], None),
         // A table with one of the two says all.
-        (BEAM, &["ghost=off", "ghost.mass_factor=0.5"], Some((None, Some(0.5)))),
+        (CUBE, &["ghost=off", "ghost.mass_factor=0.5"], Some((None, Some(0.5)))),
         (CUBE, &[], Some((stiffness, mass))),
         (CUBE, &["method.mass=lumped"], Some((stiffness, None))),
         (DYNAMIC, &["ghost="], Some((None, mass))),
@@ -105,7 +106,10 @@ fn options_change_the_deck() {
     ));
     assert!(deck.ghost.is_none());
     assert_eq!(deck.method.drop_below, 1e-8);
-    let deck = read(BEAM, &["method.velocity_update=xpic", "method.xpic_order=5"]);
+    let deck = read(
+        DYNAMIC,
+        &["method.velocity_update=xpic", "method.xpic_order=5", "method.mass=lumped"],
+    );
     assert_eq!((deck.method.xpic, deck.method.flip), (Some(5), 0.0));
     assert_eq!(deck.method.position_update, PositionUpdate::Momentum);
     assert_eq!(deck.method.point_volume, PointVolume::Deformation);
@@ -113,7 +117,7 @@ fn options_change_the_deck() {
     assert_eq!(deck.method.point_volume, PointVolume::Domain);
     let deck = read(DYNAMIC, &["method.position_update=published"]);
     assert_eq!(deck.method.position_update, PositionUpdate::Published);
-    let deck = read(BEAM, &["analysis.hht_alpha=-0.1"]);
+    let deck = read(CUBE, &["analysis.hht_alpha=-0.1"]);
     assert!((deck.analysis.newmark_beta - 1.1 * 1.1 / 4.0).abs() < 1e-15);
     assert!((deck.analysis.newmark_gamma - 0.6).abs() < 1e-15);
 }
@@ -167,4 +171,21 @@ fn ghost_body_has_the_papers_point_counts() {
         }
         assert_eq!(found, count);
     }
+}
+
+/// A material that yields at sigma_y in uniaxial tension, or at c_u in pure shear, however the
+/// deck says so: the stress that the model returns far beyond yield shows it.
+#[test]
+fn strength_in_three_ways() {
+    let stress = |set: &str, trial: [f64; 3]| {
+        let deck = read(BEAM, &["material.steel.model=von-mises", set]);
+        Material::from_deck(&deck.materials[0].model).respond(trial).stress
+    };
+    let near = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found}");
+    let tension = stress("material.steel.yield_stress=30e3", [0.2, -0.1, -0.1]);
+    near(tension[0] - tension[1], 30e3);
+    let shear = stress("material.steel.shear_strength=12e3", [0.1, -0.1, 0.0]);
+    near(shear[0], 12e3);
+    let radius = stress("material.steel.yield=20e3", [0.1, -0.1, 0.0]);
+    near(radius[0] * 2.0_f64.sqrt(), 20e3);
 }

@@ -75,7 +75,8 @@ and < 0.5, found 0.5",
 fn bodies_that_do_not_fit() {
     let shape = "box = { min = [0, 0], max = [4, 3] }";
     refused(
-        &replaced(shape, "box = { min = [0, 0], max = [0.1, 0.1] }"),
+        &replaced("points_per_cell = [2, 2]", "lattice = { spacing = 0.5, offset = [0.2, 0.2] }")
+            .set("body.0.shape={ box = { min = [0, 0], max = [0.1, 0.1] } }"),
         2,
         "error: body \"block\" has no points: its shape holds no point of its seeding inside the \
 grid; check shape, units and points_per_cell",
@@ -204,6 +205,11 @@ cell size 0.5 m: with basis = \"gimp\" a domain may not be larger than a cell (p
     points_refused(
         "x,y,x,volume\n1,1,1,0.25\n",
         &format!("error: points.csv:1: column \"x\" is there twice; {expected}"),
+    );
+    points_refused(
+        "x,y,volume\n1,1,0.25\n2,1,0.25\n\n1.0,1e0,0.2\n",
+        "error: points.csv:5: a second point at [1.0, 1.0] m, after that of line 2, whose mass would \
+count twice (points of body \"block\")",
     );
     points_refused("x,y\n1,1\n", &format!("error: points.csv:1: no column \"volume\"; {expected}"));
     points_refused(
@@ -586,7 +592,8 @@ fn formulas_that_lose_their_value_later() {
         ("explicit", "step 12 (to t = 1.200000e-2 s): "),
         ("implicit-dynamic", "step 11 of 20 (t = 1.100000e-2 s): "),
     ] {
-        let run = replaced("quasi-static", kind)
+        let run = block()
+            .set(format!("analysis.type=\"{kind}\""))
             .set("ghost={ mass_factor = 0.25 }")
             .set("analysis.steps=20")
             .set("analysis.duration=0.02")

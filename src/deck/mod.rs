@@ -7,13 +7,16 @@
 //! | `schema/` | every key once: type, unit, default, range, meaning |
 //! | `tree.rs` | TOML to values with their places; `--set` |
 //! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |
+//! | `unread.rs` | keys that the deck's choices leave unread |
 //! | `places.rs` | where each key is written, for faults seen later |
 //! | `sections/` | each section's values and the checks across sections |
 //! | `resolved.rs` | the deck with every default, as TOML |
 //! | `physics.rs` | the part that a continued run must share |
 //! | `reference.rs` | the schema as documentation |
 //! | `expression/`, `shape.rs` | formulas; regions of space |
+//! | `crossing.rs` | where lines and boxes meet the boundary of a region |
 
+mod crossing;
 pub mod expression;
 pub mod fields;
 pub mod model;
@@ -27,16 +30,19 @@ pub mod schema;
 mod sections;
 pub mod shape;
 mod tree;
+mod unread;
 mod words;
 
 use std::path::{Path, PathBuf};
 
+pub use crossing::Side;
 pub use expression::{Expression, Scope};
 pub use model::Deck;
 pub use places::Places;
 pub use problems::{figure, nearest, rough};
 pub use resolved::resolved;
 pub use shape::Shape;
+pub use unread::is_read;
 
 use crate::error::{Error, Result};
 use problems::{Problems, Sources};
@@ -70,7 +76,9 @@ fn checked(
         tree::apply_set(&mut root, option, index)
             .map_err(|why| problems.report(&Origin::Set(index), "", why, String::new()))?;
     }
+    let notes = unread::check(problems, &mut root);
     let mut deck = sections::deck(problems, &root, &directory(path))?;
+    deck.notes = notes;
     deck.places = problems.places(&root);
     Ok(deck)
 }

@@ -33,6 +33,8 @@ pub struct Deck {
     pub conditioning_displacement: Option<Vec<f64>>,
     /// `[petsc]`: option name without its dash, and value ("" for a bare flag).
     pub petsc: Vec<(String, String)>,
+    /// What the user should know of the deck itself, a line each.
+    pub notes: Vec<String>,
     /// Where the keys are written.
     pub places: Places,
 }
@@ -298,6 +300,14 @@ impl MaterialModel {
             MaterialModel::Hencky { young, .. } | MaterialModel::VonMises { young, .. } => young,
         }
     }
+
+    /// Stress at yield, Pa, if it yields.
+    pub fn strength(&self) -> Option<f64> {
+        match *self {
+            MaterialModel::Hencky { .. } => None,
+            MaterialModel::VonMises { yield_stress, .. } => Some(yield_stress),
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -310,6 +320,8 @@ pub struct Body {
     pub source: BodySource,
     /// m/s, one expression per axis of X, Y, Z.
     pub velocity: Vec<Expression>,
+    /// `overlap = "allow"`: it may lie where another body lies.
+    pub may_overlap: bool,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::expression;
 use super::fields::FIELDS;
-use super::schema::{self, Kind, Need, Section};
+use super::schema::{self, Kind, Need, Reader, Section};
 
 /// A complete deck, which a test reads.
 pub const EXAMPLE: &str = include_str!("example.toml");
@@ -13,7 +13,9 @@ const INTRODUCTION: &str = "\
 A deck is a TOML file that says everything about an analysis. Units are SI. In plane strain
 (2D) volumes, masses and forces are per metre of thickness. An unknown key, a wrong type and a
 value out of range are errors that name the file, line and column, what is accepted, and the
-nearest known name. The deck with every default is written beside the results as
+nearest known name. A key that the deck's other choices leave unread is an error, too, which names
+the choice that would read it; where `--set` makes that choice, a key of the file is set aside with
+a note. The deck with every default is written beside the results as
 `resolved.toml`.
 
 This page is written from the schema in `src/deck/schema/`; a test keeps it so
@@ -66,6 +68,32 @@ fn fields() -> String {
     out
 }
 
+/// Which side is which.
+const SIDES_SKETCH: &str = "\
+Sides are named by their axis: `left` and `right` are the lowest and the highest x, `bottom` and `top`
+y, and in 3D `back` and `front` z. With x to the right and y up, z points out of the page:
+
+```
+                 top
+          +---------------+
+         /|              /|           y
+        / |    back     / |           |
+       +---------------+  |           |
+ left  |  |            |  |  right    +---- x
+       |  +------------|--+          /
+       | /   front     | /          z
+       |/              |/
+       +---------------+
+            bottom
+```
+";
+
+/// A sentence on a choice without which a key is refused.
+fn read_by(reader: &Reader) -> String {
+    let values: Vec<String> = reader.values.iter().map(|value| format!("`\"{value}\"`")).collect();
+    format!(" Only with `{}` = {}.", reader.choice, values.join(" or "))
+}
+
 fn section(section: &Section) -> String {
     let title = match section.name {
         "" => section.header.to_string(),
@@ -75,6 +103,10 @@ fn section(section: &Section) -> String {
         "## {title}\n\n{}\n\n| key | value | unit | default | meaning |\n|---|---|---|---|---|\n",
         section.doc
     );
+    let (head, table) = out.split_at(out.find("| key |").unwrap_or(out.len()));
+    if section.name == "where" {
+        out = format!("{head}{SIDES_SKETCH}\n{table}");
+    }
     for key in section.keys {
         let range = key.range.describe();
         let mut value = match key.kind {
@@ -95,9 +127,13 @@ fn section(section: &Section) -> String {
             Need::Optional(when) => when.to_string(),
             Need::Default(text) => format!("`{text}`"),
         };
+        let readers: Vec<String> = key.readers.iter().map(read_by).collect();
         out.push_str(&format!(
-            "| `{}` | {value} | {} | {default} | {} |\n",
-            key.name, key.unit, key.doc
+            "| `{}` | {value} | {} | {default} | {}{} |\n",
+            key.name,
+            key.unit,
+            key.doc,
+            readers.concat()
         ));
     }
     out + "\n"

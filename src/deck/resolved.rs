@@ -6,10 +6,11 @@ use super::model::{
 };
 use super::schema::{self, AXES, SIDES};
 use super::shape::{Form, Shape};
+use super::unread::is_read;
 
 /// TOML of `deck` with all defaults. Relative paths have become absolute ones.
 pub fn resolved(deck: &Deck) -> String {
-    let mut w = Writer::default();
+    let mut w = Writer { deck, text: String::new() };
     w.line("", "title", quote(&deck.title));
     // A key of the top level stands before the first table.
     if deck.ghost.is_none() {
@@ -23,19 +24,23 @@ pub fn resolved(deck: &Deck) -> String {
     w.text
 }
 
-#[derive(Default)]
-struct Writer {
+struct Writer<'a> {
+    deck: &'a Deck,
     text: String,
 }
 
-impl Writer {
+impl Writer<'_> {
     fn table(&mut self, header: &str) {
         self.text.push_str(&format!("\n{header}\n"));
     }
 
-    /// One key of a section of the schema, with its unit.
+    /// One key of a section of the schema, with its unit, if the deck's choices read it.
     fn line(&mut self, section: &str, key: &str, value: String) {
-        let unit = schema::section(section).key(key).map_or("", |known| known.unit);
+        let known = schema::section(section).key(key);
+        if known.is_some_and(|known| !is_read(self.deck, known)) {
+            return;
+        }
+        let unit = known.map_or("", |known| known.unit);
         let unit = if unit.is_empty() { String::new() } else { format!("  # {unit}") };
         self.text.push_str(&format!("{key} = {value}{unit}\n"));
     }
@@ -98,7 +103,7 @@ fn expressions(all: &[Expression]) -> String {
     array(all.iter().map(expression))
 }
 
-fn analysis(w: &mut Writer, deck: &Deck) {
+fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     let a = &deck.analysis;
     w.table("[analysis]");
     w.line("analysis", "type", quote(a.kind.name()));
@@ -151,7 +156,7 @@ fn analysis(w: &mut Writer, deck: &Deck) {
     }
 }
 
-fn grid(w: &mut Writer, deck: &Deck) {
+fn grid(w: &mut Writer<'_>, deck: &Deck) {
     w.table("[grid]");
     let mesh = match &deck.grid {
         Grid::Lattice(lattice) => {
@@ -199,7 +204,7 @@ fn grid(w: &mut Writer, deck: &Deck) {
     w.optional("grid", "motion", motion.map(|motion| inline(&[motion])));
 }
 
-fn materials_and_bodies(w: &mut Writer, deck: &Deck) {
+fn materials_and_bodies(w: &mut Writer<'_>, deck: &Deck) {
     for material in &deck.materials {
         w.table(&format!("[material.{}]", quote(&material.name)));
         let (model, young, poisson, yield_stress) = match material.model {
@@ -246,6 +251,7 @@ fn materials_and_bodies(w: &mut Writer, deck: &Deck) {
             None => {}
         }
         w.line("body", "velocity", expressions(&body.velocity));
+        w.line("body", "overlap", quote(if body.may_overlap { "allow" } else { "refuse" }));
     }
 }
 
@@ -284,7 +290,7 @@ fn shape(region: &Shape) -> String {
     inline(&pairs)
 }
 
-fn conditions(w: &mut Writer, deck: &Deck) {
+fn conditions(w: &mut Writer<'_>, deck: &Deck) {
     for boundary in &deck.boundaries {
         w.table("[[boundary]]");
         w.line("boundary", "name", quote(&boundary.name));
@@ -330,7 +336,7 @@ fn conditions(w: &mut Writer, deck: &Deck) {
     }
 }
 
-fn results(w: &mut Writer, deck: &Deck) {
+fn results(w: &mut Writer<'_>, deck: &Deck) {
     for verify in &deck.verify {
         w.table("[[verify]]");
         w.line("verify", "name", quote(&verify.name));

@@ -227,7 +227,7 @@ impl Form {
     }
 }
 
-fn padded(x: &[f64]) -> [f64; 3] {
+pub(super) fn padded(x: &[f64]) -> [f64; 3] {
     std::array::from_fn(|axis| x.get(axis).copied().unwrap_or(0.0))
 }
 
@@ -240,7 +240,7 @@ fn joined(mut bounds: Bounds, other: &Bounds) -> Bounds {
 }
 
 /// Components beyond those of `from` are ignored.
-fn distance_to_segment_squared(x: &[f64; 3], from: &[f64], to: &[f64]) -> f64 {
+pub(super) fn distance_to_segment_squared(x: &[f64; 3], from: &[f64], to: &[f64]) -> f64 {
     let mut along = 0.0;
     let mut length = 0.0;
     for ((x, a), b) in x.iter().zip(from).zip(to) {

@@ -98,6 +98,14 @@ pub fn read_points<const D: usize>(
     if rows.is_empty() {
         return Err(wrong(line, "a header and no points".to_string()));
     }
+    if let Some((first, second)) = twice(&rows) {
+        let (x, lines) = (rows[first].0, [first, second].map(|row| line_of_row(path, row)));
+        let what = format!(
+            "a second point at {x:?} m, after that of line {}, whose mass would count twice",
+            lines[0]
+        );
+        return Err(wrong(lines[1], what));
+    }
     for row in share.of(rows.len()) {
         let (x, volume, velocity) = rows[row];
         let half = [0.5 * volume.powf(1.0 / D as f64); D];
@@ -106,6 +114,23 @@ pub fn read_points<const D: usize>(
         *points.velocity.last_mut().expect("a point was just pushed") = velocity;
     }
     Ok(rows.len() as u64)
+}
+
+/// The first row that repeats the place of an earlier one, after that.
+fn twice<const D: usize>(rows: &[([f64; D], f64, [f64; D])]) -> Option<(usize, usize)> {
+    let mut order: Vec<usize> = (0..rows.len()).collect();
+    let place = |row: usize| rows[row].0.map(|x| (x + 0.0).to_bits());
+    order.sort_unstable_by_key(|&row| (place(row), row));
+    let pairs = order.windows(2).filter(|pair| place(pair[0]) == place(pair[1]));
+    pairs.map(|pair| (pair[0], pair[1])).min_by_key(|pair| pair.1)
+}
+
+/// Line of a point, counted from 0.
+fn line_of_row(path: &Path, row: usize) -> u64 {
+    let mut builder = csv::ReaderBuilder::new();
+    let reader = builder.trim(csv::Trim::All).comment(Some(b'#')).from_path(path);
+    let record = reader.ok().and_then(|reader| reader.into_records().nth(row)?.ok());
+    record.map_or(0, |record| line_of(path, &record))
 }
 
 /// Line of a record: the reader counts those of comments and blanks before it as its own.

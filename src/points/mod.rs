@@ -5,16 +5,21 @@
 //! | `mod.rs` | the fields, and how a point is packed, moved and reordered |
 //! | `gather.rs` | a field's values in another order |
 //! | `seed.rs` | deck bodies -> points |
+//! | `sub_cells.rs`, `coverage.rs` | sub-cells of a lattice that a shape fills or cuts |
+//! | `overlap.rs` | are two bodies in one place? |
 //! | `seed_cells.rs` | the same for bodies that fill the cells of a mesh |
 //! | `share.rs` | which of them a rank makes |
 //! | `sort.rs` | points in the order of their cells |
 
+pub mod coverage;
 pub mod file;
 mod gather;
+pub mod overlap;
 pub mod seed;
 mod seed_cells;
 pub mod share;
 pub mod sort;
+mod sub_cells;
 
 use gather::{Gather, Moves};
 use nalgebra::Matrix3;

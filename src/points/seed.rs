@@ -10,6 +10,7 @@ use crate::grid::{Grid, Lattice};
 use super::Points;
 use super::seed_cells::CellSeeding;
 use super::share::{Share, split};
+use super::sub_cells::SubCells;
 
 /// Makes this rank's share of all bodies' points, unstrained, with their initial velocity. Beside
 /// them the identity of each body's first candidate, the same on every rank.
@@ -36,8 +37,10 @@ pub fn seed<const D: usize>(
                     Seeding::Gauss(order) => vec![*order; D],
                     Seeding::Lattice { .. } => unreachable!("matched above"),
                 };
-                within_lattice(body, shape, &counts, lattice, share)?;
-                per_cell(&mut points, index, body, shape, &counts, lattice, share, first_id)
+                let counts = std::array::from_fn(|a| counts[a]);
+                let cells = SubCells::new(lattice, counts, shape, deck.method.basis);
+                within_lattice(body, shape, &cells, counts, lattice, share)?;
+                per_cell(&mut points, index, body, shape, &cells, counts, lattice, share, first_id)
             }
             (BodySource::Shape { seeding, .. }, Grid::Mesh(mesh))
             | (BodySource::MeshCells { seeding, .. }, Grid::Mesh(mesh)) => {
@@ -110,12 +113,13 @@ impl<'a, const D: usize> CellByCell<'a, D> {
     }
 }
 
-/// An error where the seeding, carried on beyond the lattice (as far again on each side), would
-/// put a point: part of the body would be missing. A shape without bounds ends at the lattice.
+/// An error where the body reaches beyond the lattice (as far again on each side): part of it
+/// would be missing. A shape without bounds ends at the lattice.
 fn within_lattice<const D: usize>(
     body: &Body,
     shape: &Shape,
-    counts: &[usize],
+    sub_cells: &SubCells<'_, D>,
+    counts: [usize; D],
     lattice: &Lattice<D>,
     share: Share,
 ) -> Result<()> {
@@ -137,12 +141,7 @@ fn within_lattice<const D: usize>(
             continue;
         }
         for sub in 0..per_cell {
-            let part: [usize; D] = split(sub, counts);
-            let x: [f64; D] = std::array::from_fn(|a| {
-                let along = cell[a] as f64 + (part[a] as f64 + 0.5) / counts[a] as f64;
-                lattice.origin[a] + lattice.spacing[a] * along
-            });
-            if shape.contains(&x) {
+            if let Some(x) = sub_cells.inside(&sub_cell(cell, sub, counts)) {
                 let end: [f64; D] = std::array::from_fn(|a| {
                     lattice.origin[a] + lattice.spacing[a] * cells[a] as f64
                 });
@@ -157,15 +156,22 @@ fn within_lattice<const D: usize>(
     Ok(())
 }
 
-/// Equal sub-cells of every lattice cell, kept where their centre is inside. Returns the number
-/// of candidates.
+/// Index among all sub-cells of the `sub`th of a cell.
+fn sub_cell<const D: usize>(cell: [isize; D], sub: usize, counts: [usize; D]) -> [isize; D] {
+    let part: [usize; D] = split(sub, &counts);
+    std::array::from_fn(|a| cell[a] * counts[a] as isize + part[a] as isize)
+}
+
+/// A point for each sub-cell that the shape covers ([`SubCells`]). Returns the number of
+/// candidates.
 #[allow(clippy::too_many_arguments)]
 fn per_cell<const D: usize>(
     points: &mut Points<D>,
     index: usize,
     body: &Body,
     shape: &Shape,
-    counts: &[usize],
+    sub_cells: &SubCells<'_, D>,
+    counts: [usize; D],
     lattice: &Lattice<D>,
     share: Share,
     first_id: u64,
@@ -176,20 +182,15 @@ fn per_cell<const D: usize>(
         std::array::from_fn(|a| lattice.origin[a] + lattice.spacing[a] * (low[a] as f64 + place[a]))
     };
     let per_cell: usize = counts.iter().product();
-    let half: [f64; D] = std::array::from_fn(|a| 0.5 * lattice.spacing[a] / counts[a] as f64);
-    let volume = half.iter().map(|l| 2.0 * l).product();
     share.of_box(size, |place| shape.contains(&at(place))).for_each(|candidate, cell| {
+        let cell = std::array::from_fn(|a| (low[a] + cell[a]) as isize);
         for sub in 0..per_cell {
-            let part: [usize; D] = split(sub, counts);
-            let x: [f64; D] = std::array::from_fn(|a| {
-                lattice.origin[a]
-                    + lattice.spacing[a]
-                        * ((low[a] + cell[a]) as f64 + (part[a] as f64 + 0.5) / counts[a] as f64)
-            });
-            if shape.contains(&x) {
+            if let Some(made) = sub_cells.point(&sub_cell(cell, sub, counts)) {
                 let id = first_id + (candidate * per_cell + sub) as u64;
-                points.push_unstrained(id, index as u32, x, volume, body.density, half);
-                mark_outermost(points, |neighbour| shape.contains(neighbour), &x, &half);
+                let (x, half) = (made.position, made.half_length);
+                points.push_unstrained(id, index as u32, x, made.volume, body.density, half);
+                *points.outermost.last_mut().expect("a point was just pushed") =
+                    f64::from(u8::from(made.outermost));
             }
         }
     });

@@ -2,7 +2,7 @@
 
 use crate::deck::Shape;
 use crate::deck::model::{Basis, Body, BodySource, Deck, Place, Seeding};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::grid::Mesh;
 use crate::grid::quadrature::SubCell;
 
@@ -31,6 +31,17 @@ impl<'a, const D: usize> CellSeeding<'a, D> {
         seeding: &'a Seeding,
     ) -> Result<CellSeeding<'a, D>> {
         let body = &deck.bodies[index];
+        if let Seeding::PerCell(counts) = seeding
+            && mesh.element.is_simplex()
+            && counts.iter().any(|count| count != &counts[0])
+        {
+            let message = format!(
+                "expected one number, found {counts:?}: triangles and tetrahedra are cut parallel to \
+                 all their faces, into as many parts along each edge"
+            );
+            let key = format!("body.{index}.points_per_cell");
+            return Err(Error::Input(deck.places.say(&key, &message)));
+        }
         let (shape, tag) = match &body.source {
             BodySource::Shape { shape, .. } => (Some(shape), None),
             BodySource::MeshCells { tag, .. } => (None, tag.as_deref()),

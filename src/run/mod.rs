@@ -5,10 +5,11 @@
 //! | the stages of a run, in order | `session.rs` |
 //! | deck to points on their ranks | `setup.rs` |
 //! | what is checked before anything is written | `start_checks/` |
-//! | what the run will do, told ahead | `plan.rs` |
+//! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs` |
 //! | the process that MPI starts | `process.rs` |
 
 pub mod plan;
+mod plan_checks;
 pub mod process;
 pub mod session;
 pub mod setup;

@@ -1,14 +1,17 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
-use crate::deck::model::{Basis, Every};
+use crate::deck::fields::{FIELDS, FieldRank};
+use crate::deck::model::{Basis, Body, BodySource};
+use crate::deck::rough;
 use crate::output::terminal::report::Plan;
 use crate::parallel::World;
-use crate::points::Points;
+use crate::parallel::balance::imbalance;
+use crate::points::{Points, coverage};
 use crate::system::numbering::Numbering;
 use crate::system::populated::Populated;
-
-use crate::parallel::balance::imbalance;
 use crate::system::step_system::Model;
+
+use super::plan_checks;
 
 /// Counts the first step's system from its cells and nodes ([`crate::system::step_system::active`]).
 /// Collective.
@@ -23,16 +26,24 @@ pub fn of<const D: usize>(
     let all_points = world.sum_usize(points.len());
     let mut per_rank = vec![0.0; world.size()];
     per_rank[world.rank()] = points.len() as f64;
-    let frames = match (deck.output.every, deck.analysis.steps, deck.analysis.duration) {
-        (Every::Steps(every), Some(steps), _) => 1 + steps / every.max(1),
-        (Every::Seconds(seconds), _, Some(duration)) => 1 + (duration / seconds) as usize,
-        _ => 1,
-    };
+    let (time_step, steps) = plan_checks::steps(world, model, points);
+    let frames = plan_checks::frames(deck.output.every, steps, deck.analysis.duration);
+    let cells = world.sum_usize(populated.owned.len());
+    let output = frames
+        * (all_points as f64 * bytes_per_point::<D>(deck) + nodes as f64 * BYTES_PER_NODE)
+        + steps * BYTES_PER_STEP;
+    let mut facts: Vec<(String, String)> = filling(world, model, points);
+    facts.extend(time_step.map(|text| ("time step".to_string(), text)));
+    let (ratios, mut warnings): (Vec<_>, Vec<_>) =
+        plan_checks::weight_ratios(world, model, points).into_iter().unzip();
+    facts.extend(ratios.into_iter().flatten());
+    warnings.push(plan_checks::much_output(output, frames));
     Plan {
         title: deck.title.clone(),
-        facts: Vec::new(),
+        facts,
+        warnings: warnings.into_iter().flatten().collect(),
         points: all_points,
-        cells_populated: world.sum_usize(populated.owned.len()),
+        cells_populated: cells,
         active_nodes: nodes,
         equations: nodes * D,
         points_per_rank: world.sum_slice(&per_rank).into_iter().map(|n| n as usize).collect(),
@@ -41,7 +52,7 @@ pub fn of<const D: usize>(
         estimated_memory: Some(
             memory::<D>(deck.method.basis, all_points as f64, nodes as f64) as u64
         ),
-        estimated_output: Some((frames * all_points * output_bytes_per_point(deck)) as u64),
+        estimated_output: Some(output.min(1e18) as u64),
     }
 }
 
@@ -62,7 +73,54 @@ pub(crate) fn memory<const D: usize>(basis: Basis, points: f64, nodes: f64) -> f
     points * per_point as f64 + nodes * per_node as f64
 }
 
-/// Three numbers a field on the average, beside position and identity.
-fn output_bytes_per_point(deck: &crate::deck::Deck) -> usize {
-    8 * (3 * deck.output.fields.len() + 6)
+/// A frame's share of a node and the cell beside it: coordinates, vectors, scalars, connectivity.
+const BYTES_PER_NODE: f64 = 200.0;
+/// A row of history.csv, residuals.csv and log.txt.
+const BYTES_PER_STEP: f64 = 1500.0;
+
+/// A point in a frame: place, identity, body, rank, fields, and the corners of its domain.
+fn bytes_per_point<const D: usize>(deck: &crate::deck::Deck) -> f64 {
+    let numbers = |name: &String| {
+        let rank = FIELDS.iter().find(|(field, _)| field == name).map(|(_, rank)| *rank);
+        match rank {
+            Some(FieldRank::Vector) => 3,
+            Some(rank) => rank.components(3).len().max(1),
+            None => 1,
+        }
+    };
+    let corners = if deck.method.basis == Basis::Mpm { 0 } else { 3 << D };
+    let fields: usize = deck.output.fields.iter().map(numbers).sum();
+    8.0 * (3 + 1 + 3 + fields + corners) as f64
 }
+
+/// Volume of each body's points beside that of its shape, where the two differ or a shape is not
+/// filled cell by cell. Collective.
+fn filling<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> Vec<(String, String)> {
+    let mut seeded = vec![0.0; model.deck.bodies.len()];
+    for (volume, &body) in points.volume_initial.iter().zip(&points.body) {
+        seeded[body as usize] += volume;
+    }
+    let unit = if D == 2 { "m2" } else { "m3" };
+    let row = |(body, seeded): (&Body, f64)| {
+        let BodySource::Shape { shape, .. } = &body.source else { return None };
+        let exact = coverage::volume::<D>(shape)?;
+        let off = seeded / exact - 1.0;
+        let text = format!(
+            "points fill {} {unit}, the shape has {} {unit}{}",
+            rough(seeded),
+            rough(exact),
+            if off.abs() < 1e-3 { String::new() } else { format!(" ({:+.2} %)", 100.0 * off) }
+        );
+        Some((format!("body {}", body.name), text))
+    };
+    let seeded = world.sum_slice(&seeded);
+    // Decks of very many bodies need no line for each.
+    model.deck.bodies.iter().zip(seeded).take(LINES).filter_map(row).collect()
+}
+
+/// Bodies that a plan tells of one by one.
+const LINES: usize = 20;

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::io::Write as _;
+use std::io::{Read as _, Write as _};
+use std::path::Path;
 
 use mpi::environment::Universe;
 use mpi::traits::*;
@@ -68,7 +69,11 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
 /// Errors that reach this level are the same on every rank.
 fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Result<()> {
     let text = read_deck_text(world, arguments)?;
-    let deck = world.fail_together(deck::read(&arguments.input, &text, &arguments.sets))?;
+    let named = match arguments.input.to_str() {
+        Some(cli::STANDARD_INPUT) => Path::new("standard input"),
+        _ => &arguments.input,
+    };
+    let deck = world.fail_together(deck::read(named, &text, &arguments.sets))?;
     let session = Session::start(universe, &deck.petsc, &arguments.petsc)?;
     world.fail_together(known::require_known())?;
     files::require_writable(world.comm())?;
@@ -96,7 +101,14 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
 fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
     let path = &arguments.input;
     let read = if world.is_root() {
-        std::fs::read(path).map_err(|reason| {
+        let bytes = match path.to_str() {
+            Some(cli::STANDARD_INPUT) => {
+                let mut bytes = Vec::new();
+                std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
+            }
+            _ => std::fs::read(path),
+        };
+        bytes.map_err(|reason| {
             Error::Input(format!("cannot read the deck {}: {reason}", path.display()))
         })
     } else {
@@ -180,7 +192,8 @@ impl Run<'_> {
         }
         let plan = plan::of(world, &model, &points, &active);
         self.log.say(&report::plan(&plan));
-        warnings.iter().for_each(|warning| self.log.warn(warning));
+        model.deck.notes.iter().for_each(|note| self.log.say(note));
+        warnings.iter().chain(&plan.warnings).for_each(|warning| self.log.warn(warning));
         drop(active);
         solver::rehearse(world, &model, plan.equations)?;
         if self.arguments.check {

@@ -11,6 +11,7 @@ use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
 use crate::parallel::{self, Partition, World};
 use crate::points::Points;
+use crate::points::overlap;
 use crate::points::seed::{self, CellByCell};
 use crate::points::share::Share;
 
@@ -26,6 +27,7 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     check_basis(&deck, &grid)?;
     let share = Share { rank: world.rank(), ranks: world.size() };
     let (mut points, first_ids) = world.fail_together(seed::seed(&deck, &grid, share))?;
+    world.fail_together(overlap::check(&deck, &grid, &points))?;
     let cells = check_bodies(world, &deck, &grid, &points)?;
     let brick = deck.parallel.brick;
     let partition = match deck.parallel.initial {

@@ -14,36 +14,47 @@ use crate::points::Points;
 pub struct Populated {
     /// Cells reached by this rank's points, ascending; they may belong to other ranks.
     pub reached: Vec<usize>,
-    /// Populated cells this rank owns, ascending, each with one bit per body.
+    /// Populated cells this rank owns, ascending, each with one bit for each of the first
+    /// [`GROUP`] bodies.
     pub owned: Vec<(usize, u64)>,
+    /// The next [`GROUP`] bodies, and so on: their cells owned here, with a bit for each body of
+    /// the group. As many groups on every rank.
+    pub further: Vec<Vec<(usize, u64)>>,
 }
 
+/// Bodies that the bits of one word tell apart.
+pub const GROUP: usize = u64::BITS as usize;
+
 impl Populated {
-    /// Finds the cells of this rank's points and unites them at their owners. `known`: the points'
-    /// influences, if they have been found. Collective.
+    /// Finds the cells of this rank's points and unites them at their owners. `bodies`: how many
+    /// there are in all. `known`: the points' influences, if they have been found. Collective.
     pub fn find<const D: usize>(
         world: &World,
         grid: &Grid<D>,
         partition: &Partition<D>,
-        basis: Basis,
+        (basis, bodies): (Basis, usize),
         points: &Points<D>,
         known: Option<&Influences<D>>,
     ) -> Result<Self> {
+        // Entries are numbered by cell and, within a cell, by group of bodies.
+        let groups = bodies.div_ceil(GROUP).max(1);
         let mut met: Vec<(usize, u64)> = Vec::with_capacity(points.len());
         let mut cells = Vec::new();
         let mut scan = || -> Result<()> {
             for p in 0..points.len() {
                 cells.clear();
-                let near = met.last().map(|&(cell, _)| cell);
+                let near = met.last().map(|&(entry, _)| entry / groups);
                 match known.and_then(|influences| influences.cells.of(p)) {
                     Some(known) => cells.extend_from_slice(known),
                     None => basis::populated_cells(grid, basis, points, p, near, &mut cells)?,
                 }
-                let body = 1 << points.body[p];
-                for &cell in &cells {
+                let (group, bit) =
+                    (points.body[p] as usize / GROUP, points.body[p] as usize % GROUP);
+                let body = 1 << bit;
+                for entry in cells.iter().map(|&cell| cell * groups + group) {
                     match met.last_mut() {
-                        Some((last, bodies)) if *last == cell => *bodies |= body,
-                        _ => met.push((cell, body)),
+                        Some((last, bodies)) if *last == entry => *bodies |= body,
+                        _ => met.push((entry, body)),
                     }
                 }
             }
@@ -52,17 +63,18 @@ impl Populated {
         let scanned = scan();
         world.fail_together(scanned)?;
         let met = united(met);
-        let reached: Vec<usize> = met.iter().map(|&(cell, _)| cell).collect();
+        let mut reached: Vec<usize> = met.iter().map(|&(entry, _)| entry / groups).collect();
+        reached.dedup();
 
         let here = world.rank();
         let mut outgoing: FxHashMap<usize, Vec<u64>> = FxHashMap::default();
         let mut owned: Vec<(usize, u64)> = Vec::with_capacity(met.len());
-        for &(cell, bodies) in &met {
-            let owner = partition.owner_of_cell(grid, cell);
+        for &(entry, bodies) in &met {
+            let owner = partition.owner_of_cell(grid, entry / groups);
             if owner == here {
-                owned.push((cell, bodies));
+                owned.push((entry, bodies));
             } else {
-                outgoing.entry(owner).or_default().extend([cell as u64, bodies]);
+                outgoing.entry(owner).or_default().extend([entry as u64, bodies]);
             }
         }
         let alone = owned.len();
@@ -72,12 +84,35 @@ impl Populated {
         if owned.len() > alone {
             owned = united(owned);
         }
-        Ok(Populated { reached, owned })
+        let (owned, further) = by_group(owned, groups);
+        Ok(Populated { reached, owned, further })
     }
 }
 
-/// Entries ascending by cell, those of one cell joined: by a table where the cells lie close
-/// together, by sorting where they do not.
+/// Cells, ascending, each with the bits of its bodies.
+type Cells = Vec<(usize, u64)>;
+
+/// Entries `cell * groups + group`, ascending, as cells with the bits of the first group, and those
+/// of each other group.
+fn by_group(entries: Cells, groups: usize) -> (Cells, Vec<Cells>) {
+    if groups == 1 {
+        return (entries, Vec::new());
+    }
+    let mut all = Cells::new();
+    let mut further = vec![Vec::new(); groups - 1];
+    for (entry, bodies) in entries {
+        let (cell, group) = (entry / groups, entry % groups);
+        if all.last().is_none_or(|&(last, _)| last != cell) {
+            all.push((cell, if group == 0 { bodies } else { 0 }));
+        }
+        if group > 0 {
+            further[group - 1].push((cell, bodies));
+        }
+    }
+    (all, further)
+}
+
+/// Entries ascending, those of one number joined: by a table where the numbers lie close together, by sorting where they do not.
 fn united(mut entries: Vec<(usize, u64)>) -> Vec<(usize, u64)> {
     let cells = || entries.iter().map(|&(cell, _)| cell);
     let (Some(low), Some(high)) = (cells().min(), cells().max()) else { return entries };
@@ -102,7 +137,7 @@ fn united(mut entries: Vec<(usize, u64)>) -> Vec<(usize, u64)> {
 
 #[cfg(test)]
 mod tests {
-    use super::united;
+    use super::{by_group, united};
 
     #[test]
     fn table_and_sorting_agree() {
@@ -111,5 +146,13 @@ mod tests {
             assert_eq!(united(entries.to_vec()), [(3 * spread, 2), (7 * spread, 5)]);
         }
         assert!(united(Vec::new()).is_empty());
+    }
+
+    #[test]
+    fn groups_of_bodies_keep_their_own_cells() {
+        // Cell 4 with both groups, cell 5 with the second alone, cell 9 with the first.
+        let (all, further) = by_group(vec![(8, 1), (9, 2), (11, 4), (18, 1 << 63)], 2);
+        assert_eq!(all, [(4, 1), (5, 0), (9, 1 << 63)]);
+        assert_eq!(further, [[(4, 2), (5, 4)]]);
     }
 }

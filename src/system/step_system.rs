@@ -6,7 +6,7 @@ use super::face_points;
 use super::numbering::Numbering;
 use super::numbering::Touched;
 use super::pattern::{self, Pattern};
-use super::populated::Populated;
+use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use crate::basis::{self, Groups, Influences};
 use crate::deck::Deck;
@@ -14,7 +14,7 @@ use crate::deck::model::{Basis, PointVolume, Tangent};
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
-use crate::grid::Grid;
+use crate::grid::{FacePair, Grid};
 use crate::loads::manufactured::Manufactured;
 use crate::loads::point_forces;
 use crate::material::Material;
@@ -162,7 +162,8 @@ impl<const D: usize> Discretisation<D> {
             face_points::settle(world, grid, partition, points, &mut influences)?;
         }
         let groups = Groups::new(&influences);
-        let populated = Populated::find(world, grid, partition, basis, points, Some(&influences))?;
+        let kinds = (basis, model.deck.bodies.len());
+        let populated = Populated::find(world, grid, partition, kinds, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {
             Coupling::Matrix | Coupling::Mass => find_faces(world, model, &populated)?,
             Coupling::Diagonal => Default::default(),
@@ -294,7 +295,8 @@ pub fn active<const D: usize>(
     points: &Points<D>,
 ) -> Result<(Populated, Numbering)> {
     let (grid, partition) = (&model.grid, &model.partition);
-    let populated = Populated::find(world, grid, partition, model.deck.method.basis, points, None)?;
+    let kinds = (model.deck.method.basis, model.deck.bodies.len());
+    let populated = Populated::find(world, grid, partition, kinds, points, None)?;
     let mut reached = Vec::new();
     append_nodes(world, grid, &populated, &mut reached);
     let touched = Touched::settle(world, grid, partition, reached)?;
@@ -323,8 +325,26 @@ pub(crate) fn find_faces<const D: usize>(
     populated: &Populated,
 ) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
     let Some(ghost) = &model.deck.ghost else { return Ok((Vec::new(), Vec::new())) };
-    let faces = boundary_faces(world, &model.grid, &model.partition, &populated.owned)?;
-    let cells = faces.iter().flat_map(|face| [face.pair.lower, face.pair.upper]).collect();
-    let stencils = face_stencils(&model.grid, &faces, ghost.scaling, &model.penalties);
-    Ok((world.fail_together(stencils)?, cells))
+    let groups = std::iter::once(&populated.owned).chain(&populated.further);
+    let mut found: Vec<(FacePair, FaceStencil)> = Vec::new();
+    for (cells, penalties) in groups.zip(model.penalties.chunks(GROUP)) {
+        let faces = boundary_faces(world, &model.grid, &model.partition, cells)?;
+        let stencils = face_stencils(&model.grid, &faces, ghost.scaling, penalties);
+        let stencils = world.fail_together(stencils)?;
+        found.extend(faces.iter().map(|face| face.pair).zip(stencils));
+    }
+    if !populated.further.is_empty() {
+        // A face of bodies in several groups takes the largest penalty among them, too.
+        found.sort_by_key(|(pair, _)| (pair.lower, pair.upper));
+        found.dedup_by(|(next, other), (pair, kept)| {
+            let same = (next.lower, next.upper) == (pair.lower, pair.upper);
+            if same {
+                kept.stiffness = kept.stiffness.max(other.stiffness);
+                kept.mass = kept.mass.max(other.mass);
+            }
+            same
+        });
+    }
+    let cells = found.iter().flat_map(|(pair, _)| [pair.lower, pair.upper]).collect();
+    Ok((found.into_iter().map(|(_, stencil)| stencil).collect(), cells))
 }

@@ -58,7 +58,15 @@ impl Table<'_> {
             unreachable!("only keys of kind tables are opened as arrays of tables")
         };
         let Some(node) = self.node(name) else { return Ok(Vec::new()) };
-        let Value::Array(items) = &node.value else { return Err(self.mismatch(key, node)) };
+        let Value::Array(items) = &node.value else {
+            if let Value::Table(_) = node.value {
+                let full = self.full(name);
+                let message = format!("expected an array of tables, found a single table [{full}]");
+                let help = format!("write [[{full}]], in double brackets, once for each of them");
+                return Err(self.problem_with_help(name, message, help));
+            }
+            return Err(self.mismatch(key, node));
+        };
         let all: Vec<Got<T>> = items
             .iter()
             .enumerate()

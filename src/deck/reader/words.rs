@@ -64,7 +64,7 @@ impl Table<'_> {
     pub fn choices(&self, name: &str, allowed: &[&str]) -> Got<Vec<usize>> {
         let found = self.read(name, |key, node| {
             let mut chosen = Vec::new();
-            for item in self.items(key, node)? {
+            let mut one = |item: &Node| {
                 let text = self.text_in(&Key { kind: Kind::Text, ..*key }, item)?;
                 let Some(at) = allowed.iter().position(|known| *known == text) else {
                     return Err(self.unknown_word(name, &text, allowed, &item.origin));
@@ -75,7 +75,11 @@ impl Table<'_> {
                     return Err(self.problems.report(&item.origin, &full, message, String::new()));
                 }
                 chosen.push(at);
-            }
+                Ok(())
+            };
+            // All of them, so that every unknown word is told.
+            let told: Vec<Got<()>> = self.items(key, node)?.iter().map(&mut one).collect();
+            told.into_iter().collect::<Got<()>>()?;
             Ok(chosen)
         });
         Ok(found?.unwrap_or_default())

@@ -4,7 +4,7 @@ use super::Kind::{
     Choice, Choices, Count, CountOrCounts, Expression, Expressions, Number, Points, Special, Table,
     Text, Vector,
 };
-use super::Need::{Optional, Required};
+use super::Need::{Default, Optional, Required};
 use super::{AXES, POSITIVE, Section, at_least, between, inside, key};
 
 const SHAPES: &str = "an array of shapes";
@@ -24,8 +24,14 @@ pub const SECTIONS: &[Section] = &[
             key("young", Number, Required, "Young's modulus; zero (none) only in explicit runs.")
                 .unit("Pa").range(at_least(0.0)),
             key("poisson", Number, Required, "Poisson's ratio.").range(inside(-1.0, 0.5)),
-            key("yield", Number, Optional("needed by von-mises, only there"),
-                "rho_y: radius sqrt(2 J2) of the Kirchhoff stress at yield (Lagrangian eq. 43).")
+            key("yield", Number, Optional("von-mises: one of the three, only there"),
+                "rho_y: radius sqrt(2 J2) of the Kirchhoff stress at yield, as in the papers (Lagrangian eq. 43).")
+                .unit("Pa").range(POSITIVE),
+            key("yield_stress", Number, Optional("or yield, or shear_strength"),
+                "sigma_y: stress at yield in uniaxial tension; rho_y = sqrt(2/3) sigma_y.")
+                .unit("Pa").range(POSITIVE),
+            key("shear_strength", Number, Optional("or yield, or yield_stress"),
+                "c_u: stress at yield in pure shear, as of undrained clay; rho_y = sqrt(2) c_u.")
                 .unit("Pa").range(POSITIVE),
         ],
     },
@@ -48,7 +54,9 @@ pub const SECTIONS: &[Section] = &[
                 .range(between(1.0, 8.0)),
             key("velocity", Expressions("X Y Z"), Optional("zeros, or those of the file of points"),
                 "Initial velocity. An explicit run takes it half a time step before the start, as leapfrog does: a body in free fall is g dt t / 2 further at the time t than one that has it at t = 0 (subtract a dt / 2, a the first acceleration, for the velocity at t = 0).")
-                .unit("m/s"),
+                .unit("m/s").read_by(&[super::DYNAMIC]),
+            key("overlap", Choice(&["refuse", "allow"]), Default("\"refuse\""),
+                "Bodies that lie in one place are refused, as mass counts twice there, unless one of the two allows it."),
         ],
     },
     Section {

@@ -142,11 +142,38 @@ pub struct Key {
     pub unit: &'static str,
     pub need: Need,
     pub range: Range,
+    /// Choices that read it: all must have been made. Empty: it is always read.
+    pub readers: &'static [Reader],
     pub doc: &'static str,
 }
 
+/// A choice made elsewhere in the deck, by its dotted path, and its values that read a key.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reader {
+    pub choice: &'static str,
+    pub values: &'static [&'static str],
+}
+
+const fn only(choice: &'static str, values: &'static [&'static str]) -> Reader {
+    Reader { choice, values }
+}
+
+/// Analyses that solve equilibrium by iterations.
+const IMPLICIT: Reader = only("analysis.type", &["quasi-static", "implicit-dynamic"]);
+const QUASI_STATIC: Reader = only("analysis.type", &["quasi-static"]);
+const EXPLICIT: Reader = only("analysis.type", &["explicit"]);
+const IMPLICIT_DYNAMIC: Reader = only("analysis.type", &["implicit-dynamic"]);
+/// Analyses in which the bodies have inertia.
+const DYNAMIC: Reader = only("analysis.type", &["explicit", "implicit-dynamic"]);
+/// Analyses that move the bodies by forces.
+const LOADED: Reader = only("analysis.type", &["quasi-static", "explicit", "implicit-dynamic"]);
+/// Analyses with a stiffness matrix, and with a mass matrix: what Ghost stabilises.
+const STIFF: Reader = only("analysis.type", &["quasi-static", "implicit-dynamic", "conditioning"]);
+const HEAVY: Reader = only("analysis.type", &["explicit", "implicit-dynamic", "conditioning"]);
+const GIMP: Reader = only("method.basis", &["gimp"]);
+
 const fn key(name: &'static str, kind: Kind, need: Need, doc: &'static str) -> Key {
-    Key { name, kind, unit: "", need, range: ANY, doc }
+    Key { name, kind, unit: "", need, range: ANY, readers: &[], doc }
 }
 
 impl Key {
@@ -156,6 +183,10 @@ impl Key {
 
     const fn range(self, range: Range) -> Self {
         Key { range, ..self }
+    }
+
+    const fn read_by(self, readers: &'static [Reader]) -> Self {
+        Key { readers, ..self }
     }
 }
 

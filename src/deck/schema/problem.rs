@@ -5,7 +5,10 @@ use super::Kind::{
     Vector,
 };
 use super::Need::{Default, Optional, Required};
-use super::{POSITIVE, Section, at_least, between, key};
+use super::{
+    DYNAMIC, EXPLICIT, GIMP, HEAVY, IMPLICIT, IMPLICIT_DYNAMIC, LOADED, POSITIVE, QUASI_STATIC,
+    STIFF, Section, at_least, between, key, only,
+};
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
@@ -28,7 +31,8 @@ pub const SECTIONS: &[Section] = &[
             key("material", Named("material"), Required, "At least one `[material.NAME]`."),
             key("body", Tables("body"), Required, "At least one `[[body]]`."),
             key("boundary", Tables("boundary"), Optional("none"), "Prescribed displacements."),
-            key("load", Tables("load"), Optional("none"), "Forces."),
+            key("load", Tables("load"), Optional("none"), "Forces.")
+                .read_by(&[LOADED]),
             key("verify", Tables("verify"), Optional("none"), "Figures of merit."),
             key("output", Table("output"), Optional("all defaults"), "What is written, and when."),
             key("parallel", Table("parallel"), Optional("all defaults"), "Distribution."),
@@ -52,27 +56,36 @@ pub const SECTIONS: &[Section] = &[
                 "Time step as a fraction of the stability limit.").range(POSITIVE),
             key("tolerance", Number, Default("1e-9"),
                 "Normalised residual that ends the iterations (Lagrangian eq. 40).")
-                .range(POSITIVE),
+                .range(POSITIVE)
+                .read_by(&[IMPLICIT]),
             key("max_iterations", Count, Default("20"),
                 "Evaluations of the residual in one step, the first at zero displacement included.")
-                .range(at_least(2.0)),
+                .range(at_least(2.0))
+                .read_by(&[IMPLICIT]),
             key("on_failure", Choice(OnFailure::NAMES), Default("\"stop\""),
-                "What to do with a step that does not converge: stop, or halve it and retry."),
+                "What to do with a step that does not converge: stop, or halve it and retry.")
+                .read_by(&[IMPLICIT]),
             key("smallest_step", Number, Default("0.0009765625"),
                 "With on_failure = \"cut\": smallest step as a fraction of the nominal one.")
-                .range(super::Range { low_included: false, ..between(0.0, 1.0) }),
+                .range(super::Range { low_included: false, ..between(0.0, 1.0) })
+                .read_by(&[IMPLICIT, only("analysis.on_failure", &["cut"])]),
             key("inverted_iterates", Choice(InvertedIterates::NAMES), Default("\"reject\""),
-                "Iterates in which a point is turned inside out (det dF <= 0)."),
+                "Iterates in which a point is turned inside out (det dF <= 0).")
+                .read_by(&[IMPLICIT]),
             key("tangent", Choice(Tangent::NAMES), Default("\"auto\""),
                 "`auto`: symmetric storage and solvers where all materials have a symmetric \
-                 tangent. `unsymmetric`: the general ones (FGMRES, line search) in any case."),
+                 tangent. `unsymmetric`: the general ones (FGMRES, line search) in any case.")
+                .read_by(&[IMPLICIT]),
             key("newmark_beta", Number, Default("0.25"), "Implicit dynamics.")
-                .range(super::Range { low_included: false, ..between(0.0, 0.5) }),
+                .range(super::Range { low_included: false, ..between(0.0, 0.5) })
+                .read_by(&[IMPLICIT_DYNAMIC]),
             key("newmark_gamma", Number, Default("0.5"), "Implicit dynamics.")
-                .range(between(0.5, 1.0)),
+                .range(between(0.5, 1.0))
+                .read_by(&[IMPLICIT_DYNAMIC]),
             key("hht_alpha", Number, Default("0.0"),
                 "Implicit dynamics: numerical damping; sets Newmark's beta and gamma.")
-                .range(between(-1.0 / 3.0, 0.0)),
+                .range(between(-1.0 / 3.0, 0.0))
+                .read_by(&[IMPLICIT_DYNAMIC]),
         ],
     },
     Section {
@@ -85,25 +98,35 @@ pub const SECTIONS: &[Section] = &[
             key("control", Choice(&["off", "fem"]), Default("\"off\""),
                 "fem: the same deck by updated-Lagrangian finite elements, as a control: Gauss points for points_per_cell, basis mpm, a mesh that follows the material."),
             key("domain_update", Choice(DomainUpdate::NAMES), Default("\"corners\""),
-                "How GIMP domains follow the deformation (Lagrangian eq. 32-39)."),
+                "How GIMP domains follow the deformation (Lagrangian eq. 32-39).")
+                .read_by(&[GIMP, LOADED]),
             key("gimp_edge", Choice(GimpEdge::NAMES), Default("\"continued\""),
-                "Functions of a GIMP domain that sticks out of the grid. continued: those of the grid's outer cell go on, so that no weight is lost. published: hats of the grid's own nodes, which lose the share of a node beyond the edge (the papers' tables)."),
+                "Functions of a GIMP domain that sticks out of the grid. continued: those of the grid's outer cell go on, so that no weight is lost. published: hats of the grid's own nodes, which lose the share of a node beyond the edge (the papers' tables).")
+                .read_by(&[GIMP]),
             key("point_volume", Choice(PointVolume::NAMES), Default("\"deformation\""),
-                "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none)."),
+                "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none).")
+                .read_by(&[GIMP, QUASI_STATIC]),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
-                "State in which equilibrium is written (Lagrangian §3-5)."),
-            key("mass", Choice(Mass::NAMES), Default("\"consistent\""), "Mass matrix (dynamics)."),
+                "State in which equilibrium is written (Lagrangian §3-5).")
+                .read_by(&[IMPLICIT]),
+            key("mass", Choice(Mass::NAMES), Default("\"consistent\""), "Mass matrix (dynamics).")
+                .read_by(&[DYNAMIC]),
             key("stress_update", Choice(StressUpdate::NAMES), Default("\"musl\""),
-                "When stress is updated in an explicit step: first, last, or last with remapped velocity (musl). usl dissipates."),
+                "When stress is updated in an explicit step: first, last, or last with remapped velocity (musl). usl dissipates.")
+                .read_by(&[EXPLICIT]),
             key("position_update", Choice(PositionUpdate::NAMES), Default("\"momentum\""),
-                "What moves the points of an explicit step with the consistent mass: the velocity that keeps the angular momentum, or the updated nodal velocity (published: Ghost eq. 9)."),
+                "What moves the points of an explicit step with the consistent mass: the velocity that keeps the angular momentum, or the updated nodal velocity (published: Ghost eq. 9).")
+                .read_by(&[EXPLICIT, only("method.mass", &["consistent"])]),
             key("velocity_update", Special("\"flip\", \"pic\", \"xpic\", or a number from 0 (pic) to 1 (flip)"),
-                Default("\"flip\""), "How points take their velocity from the grid, in explicit and implicit dynamics; xpic is explicit."),
+                Default("\"flip\""), "How points take their velocity from the grid, in explicit and implicit dynamics; xpic is explicit.")
+                .read_by(&[DYNAMIC]),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
-                "Order m of XPIC(m).").range(at_least(1.0)),
+                "Order m of XPIC(m).").range(at_least(1.0))
+                .read_by(&[only("method.velocity_update", &["xpic"])]),
             key("drop_below", Number, Optional("0 with Ghost stiffness and in explicit runs, 1e-8 without"),
                 "Nodes whose summed basis weight is below this fraction of the largest are held at zero.")
-                .range(between(0.0, 1.0)),
+                .range(between(0.0, 1.0))
+                .read_by(&[IMPLICIT]),
         ],
     },
     Section {
@@ -112,13 +135,17 @@ pub const SECTIONS: &[Section] = &[
         doc: "Ghost stabilisation (Ghost §3). Without this table, or without a stiffness and a mass in it, the default factors are in force: stiffness_factor = 0.01 in implicit analyses, and mass_factor = 0.25 in dynamics with the consistent mass (a conditioning study takes both). Nothing is stabilised in explicit analyses with the lumped mass, with method.control = \"fem\", and with `ghost = \"off\"`. A table with a stiffness or a mass says all: what it leaves out is not stabilised. An absolute value or a factor, not both. How the defaults were chosen: docs/evidence/ghost-factors.md.",
         keys: &[
             key("stiffness", Number, Optional("no Ghost stiffness"), "gamma_K.")
-                .unit("Pa").range(at_least(0.0)),
+                .unit("Pa").range(at_least(0.0))
+                .read_by(&[STIFF]),
             key("stiffness_factor", Number, Optional("no Ghost stiffness"),
-                "gamma_K as a multiple of each body's Young's modulus.").range(at_least(0.0)),
+                "gamma_K as a multiple of each body's Young's modulus.").range(at_least(0.0))
+                .read_by(&[STIFF]),
             key("mass", Number, Optional("no Ghost mass"), "gamma_M.")
-                .unit("kg/m3").range(at_least(0.0)),
+                .unit("kg/m3").range(at_least(0.0))
+                .read_by(&[HEAVY]),
             key("mass_factor", Number, Optional("no Ghost mass"),
-                "gamma_M as a multiple of each body's density.").range(at_least(0.0)),
+                "gamma_M as a multiple of each body's density.").range(at_least(0.0))
+                .read_by(&[HEAVY]),
             key("scaling", Choice(GhostScaling::NAMES), Default("\"scale-free\""),
                 "Scale of the face matrix J: gamma_K J / h2 and gamma_M J (scale-free), J as in eq. 23 (literal), or (h2/4) J (published: reproduces the papers' tables)."),
         ],
@@ -319,7 +346,8 @@ pub const RESULT_SECTIONS: &[Section] = &[
                 Optional("chosen by size"),
                 "Cells per side of a lattice brick, the unit of partition.",
             )
-            .range(at_least(1.0)),
+            .range(at_least(1.0))
+            .read_by(&[only("grid.type", &["lattice"])]),
             key(
                 "initial",
                 Choice(Initial::NAMES),

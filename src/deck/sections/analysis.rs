@@ -1,6 +1,6 @@
 //! `[analysis]`, `[method]`, `[conditioning]`.
 
-use crate::deck::model::{Analysis, AnalysisType, Basis, Mass, Method, PointVolume};
+use crate::deck::model::{Analysis, AnalysisType, Basis, Mass, Method};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::between;
@@ -116,9 +116,6 @@ pub fn method(
     let drop_below = table.number_if("drop_below");
     let (flip, xpic) = velocity?;
     let order = order?;
-    if order.is_some() && !xpic {
-        return Err(table.problem("xpic_order", "only with velocity_update = \"xpic\""));
-    }
     if xpic && kind.is_some_and(|kind| kind != AnalysisType::Explicit) {
         return Err(table.problem(
             "velocity_update",
@@ -137,13 +134,6 @@ pub fn method(
     }
     let mass = if xpic { Mass::Lumped } else { mass };
     let (basis, point_volume) = (basis?, point_volume?);
-    let quasi_static = kind.is_none_or(|kind| kind == AnalysisType::QuasiStatic);
-    if point_volume == PointVolume::Domain && !(basis == Basis::Gimp && quasi_static) {
-        return Err(table.problem(
-            "point_volume",
-            "\"domain\" is for basis = \"gimp\" in analysis.type = \"quasi-static\"",
-        ));
-    }
     // Explicit steps keep every node that has mass: dropping one would lose its momentum.
     let keeps_all = stiffened || kind == Some(AnalysisType::Explicit);
     Ok(Method {

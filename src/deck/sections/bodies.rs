@@ -22,20 +22,42 @@ pub struct World<'a> {
     pub method: Option<&'a Method>,
 }
 
-pub fn materials(root: &Table<'_>, kind: Option<AnalysisType>) -> Got<Vec<Material>> {
+/// Largest modulus and density: sums over bodies of any size stay finite.
+const LARGEST: f64 = 1e100;
+
+/// Reports a value whose squares and sums would not be finite.
+fn finite_sums(table: &Table<'_>, key: &str, value: f64) -> Got<f64> {
+    if value <= LARGEST {
+        return Ok(value);
+    }
+    let what = format!(
+        "expected at most {LARGEST:e}, so that energies and sums stay finite, found {}",
+        figure(value)
+    );
+    Err(table.problem_with_help(key, what, "choose units in which the numbers are smaller"))
+}
+
+pub fn materials(root: &Table<'_>, analysis: Option<&Analysis>) -> Got<Vec<Material>> {
+    let kind = analysis.map(|analysis| analysis.kind);
     let materials = root.named("material", |name, table| {
         let model = table.choice_of("model", &["hencky", "von-mises"]);
         let (young, poisson) = (table.number("young"), table.number("poisson"));
+        let young = young.and_then(|young| finite_sums(&table, "young", young));
+        if young == Ok(0.0) && analysis.is_some_and(|analysis| analysis.cfl.is_some()) {
+            return Err(table.problem_with_help(
+                "young",
+                "expected > 0 Pa: without stiffness there is no stability limit for cfl to divide",
+                "give analysis.steps in place of analysis.cfl",
+            ));
+        }
         if young == Ok(0.0) && kind.is_some_and(|kind| kind != AnalysisType::Explicit) {
             return Err(table.problem("young", "expected > 0 Pa: only explicit runs do without"));
         }
-        let yield_stress = table.number_if("yield");
         let model = if model? == 0 {
-            table.refuse(&["yield"], "only for model = \"von-mises\"")?;
+            table.refuse(&STRENGTHS, "only for model = \"von-mises\"")?;
             MaterialModel::Hencky { young: young?, poisson: poisson? }
         } else {
-            let yield_stress = yield_stress?
-                .ok_or_else(|| table.missing("yield", "model = \"von-mises\" needs it"));
+            let yield_stress = yield_radius(&table);
             MaterialModel::VonMises {
                 young: young?,
                 poisson: poisson?,
@@ -48,6 +70,25 @@ pub fn materials(root: &Table<'_>, kind: Option<AnalysisType>) -> Got<Vec<Materi
         return Err(root.missing("material", "expected a [material.NAME]"));
     }
     Ok(materials)
+}
+
+/// Three ways to say when a von Mises material yields.
+const STRENGTHS: [&str; 3] = ["yield", "yield_stress", "shear_strength"];
+
+/// rho_y, Pa: sqrt(2 J2) at yield. In uniaxial tension J2 = sigma_y^2 / 3, in pure shear J2 = c_u^2.
+fn yield_radius(table: &Table<'_>) -> Got<f64> {
+    let values = STRENGTHS.map(|key| table.number_if(key));
+    let ratios = [1.0, (2.0_f64 / 3.0).sqrt(), std::f64::consts::SQRT_2];
+    if !STRENGTHS.iter().any(|key| table.given(key)) {
+        let how = "model = \"von-mises\" needs it, or yield_stress (uniaxial), or shear_strength";
+        return Err(table.missing("yield", how));
+    }
+    table.one_of(&STRENGTHS)?;
+    let mut radius = None;
+    for (value, ratio) in values.into_iter().zip(ratios) {
+        radius = value?.map(|value| ratio * value).or(radius);
+    }
+    radius.ok_or_else(|| table.missing("yield", ""))
 }
 
 /// Names of the materials as written, whether or not they are right.
@@ -86,6 +127,7 @@ pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
         let material = material(&table, &materials);
         let density = density(&table, world);
         let velocity = table.expressions_if("velocity", world.dimension);
+        let overlap = table.choice_of("overlap", &["refuse", "allow"]);
         let source = table.table("shape", |shape| source(&table, &shape, world));
         let rest = || vec![Expression::constant(0.0); world.dimension];
         Ok(Body {
@@ -94,12 +136,22 @@ pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
             density: density?,
             source: source?,
             velocity: velocity?.unwrap_or_else(rest),
+            may_overlap: overlap? == 1,
         })
     })?;
     if bodies.is_empty() {
         return Err(root.missing("body", "expected a [[body]]"));
     }
     Ok(bodies)
+}
+
+/// The first body without the key `density`, by its index.
+pub fn without_density(root: &Table<'_>) -> Option<usize> {
+    let Some(Value::Array(items)) = root.node("body").map(|node| &node.value) else { return None };
+    items.iter().position(|item| match &item.value {
+        Value::Table(entries) => !entries.iter().any(|entry| entry.key == "density"),
+        _ => false,
+    })
 }
 
 fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {
@@ -112,7 +164,7 @@ fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {
 }
 
 fn density(table: &Table<'_>, world: &World<'_>) -> Got<f64> {
-    let density = table.number_if("density")?.unwrap_or(0.0);
+    let density = finite_sums(table, "density", table.number_if("density")?.unwrap_or(0.0))?;
     if let Some(kind) = world.analysis.map(|analysis| analysis.kind)
         && kind != AnalysisType::QuasiStatic
         && density <= 0.0

@@ -1,6 +1,6 @@
 //! `[[boundary]]` and `[[load]]`.
 
-use super::bodies::World;
+use super::bodies::{self, World};
 use super::shapes;
 use crate::deck::model::{Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, Rotation};
 use crate::deck::problems::Got;
@@ -104,12 +104,12 @@ fn body(table: &Table<'_>, key: &'static str, bodies: &[String]) -> Got<usize> {
         .ok_or_else(|| table.unknown_word(key, &name, &known, table.origin(key)))
 }
 
-/// `bodies`: as read, if that succeeded; `names`: as written.
+/// `read`: the bodies as read, if that succeeded; `names`: as written.
 pub fn loads(
     root: &Table<'_>,
     world: &World<'_>,
     names: &[String],
-    bodies: Option<&[Body]>,
+    read: Option<&[Body]>,
 ) -> Got<Vec<Load>> {
     let dimension = world.dimension;
     root.tables("load", |_, table| {
@@ -131,11 +131,19 @@ pub fn loads(
             }),
             "gravity" => {
                 let gravity = table.vector("gravity", dimension)?;
-                let weightless = bodies.is_some_and(|all| all.iter().all(|b| b.density == 0.0));
+                let weightless = read.is_some_and(|all| all.iter().all(|b| b.density == 0.0));
                 if weightless && gravity.iter().any(|g| *g != 0.0) {
                     return Err(
                         table.problem("gravity", "acts on nothing: every body has density 0")
                     );
+                }
+                if let (Some(all), Some(light)) = (read, bodies::without_density(root))
+                    && gravity.iter().any(|g| *g != 0.0)
+                {
+                    let name = &all[light].name;
+                    let what = format!("body \"{name}\" has no density, and others have one");
+                    let help = "give it a density; density = 0.0 says that it is to be weightless";
+                    return Err(table.problem_with_help("gravity", what, help));
                 }
                 Ok(Load::Gravity(gravity))
             }

@@ -38,7 +38,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let kind = analysis.as_ref().ok().map(|analysis| analysis.kind);
     let method = root
         .table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok(), kind));
-    let materials = bodies::materials(&root, kind);
+    let materials = bodies::materials(&root, analysis.as_ref().ok());
     let output = root.table_or_default("output", |table| results::output(&table, kind));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = results::petsc(&root);
@@ -85,6 +85,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
         parallel: parallel?,
         conditioning_displacement: conditioning?,
         petsc: petsc?,
+        notes: Vec::new(),
         places: Places::default(),
         grid,
     };

@@ -31,6 +31,8 @@ pub struct Plan {
     pub title: String,
     /// Pairs of a word and its meaning, in order: `("analysis", "quasi-static, 50 steps")`.
     pub facts: Vec<(String, String)>,
+    /// Figures that point at a slip.
+    pub warnings: Vec<String>,
     pub points: usize,
     pub cells_populated: usize,
     pub active_nodes: usize,
@@ -273,6 +275,7 @@ mod tests {
         let text = plan(&Plan {
             title: "Beam".into(),
             facts: vec![("analysis".into(), "quasi-static, 50 steps".into())],
+            warnings: Vec::new(),
             points: 80,
             cells_populated: 20,
             active_nodes: 33,

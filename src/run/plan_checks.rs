@@ -1,0 +1,146 @@
+//! What figures of a plan tell of slips: of units, by ratios that have no unit, and of sizes.
+
+use crate::analysis::time_steps::{TimeSteps, stability_limit};
+use crate::deck::model::{Every, Load};
+use crate::deck::rough;
+use crate::parallel::World;
+use crate::points::Points;
+use crate::system::conditions::StepSpan;
+use crate::system::step_system::Model;
+
+/// rho g H / E and rho g H / strength of ordinary problems lie between these. A column of rubber
+/// that its weight halves has the largest, a metre of steel the smallest; a slip of a unit is a
+/// factor of a thousand or a million.
+const OVER_YOUNG: [f64; 2] = [1e-9, 10.0];
+const OVER_STRENGTH: [f64; 2] = [1e-6, 50.0];
+/// Result files beyond this are worth a second thought, bytes.
+const MUCH_OUTPUT: f64 = 1e11;
+
+/// A row of the plan, and what to warn of.
+pub type Row = (Option<(String, String)>, Option<String>);
+
+/// Weight of each body over its stiffness and strength, where gravity acts. Collective.
+pub fn weight_ratios<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> Vec<Row> {
+    let mut gravity = [0.0; D];
+    for load in &model.deck.loads {
+        if let Load::Gravity(g) = load {
+            gravity.iter_mut().zip(g).for_each(|(sum, g)| *sum += g);
+        }
+    }
+    let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    if size == 0.0 {
+        return Vec::new();
+    }
+    let heights = heights(world, model, points, gravity.map(|g| g / size));
+    let mut rows = Vec::new();
+    for (index, body) in model.deck.bodies.iter().enumerate() {
+        let weight = body.density * size * heights[index];
+        let material = &model.deck.materials[body.material].model;
+        let young = material.young();
+        if weight == 0.0 || young == 0.0 {
+            continue;
+        }
+        let of_young = weight / young;
+        let strength = material.strength();
+        let mut text =
+            format!("rho g H / E = {} with H = {} m", rough(of_young), rough(heights[index]));
+        if let Some(strength) = strength {
+            text.push_str(&format!(", rho g H / strength = {}", rough(weight / strength)));
+        }
+        let mut warning = unusual("rho g H / E", of_young, OVER_YOUNG);
+        if let Some(strength) = strength {
+            let ratio = weight / strength;
+            warning = warning.or(unusual("rho g H / strength", ratio, OVER_STRENGTH));
+        }
+        let warning = warning.map(|what| {
+            format!(
+                "body \"{}\": {what}; check the units of density (kg/m3), gravity (m/s2), \
+                 young and strength (Pa), and lengths (m)",
+                body.name
+            )
+        });
+        rows.push((Some((format!("body {}", body.name), text)), warning));
+    }
+    rows
+}
+
+fn unusual(what: &str, value: f64, [low, high]: [f64; 2]) -> Option<String> {
+    (value < low || value > high)
+        .then(|| format!("{what} = {} is far from usual values ({low:e} to {high})", rough(value)))
+}
+
+/// Extent of each body along a direction, m. Collective.
+fn heights<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    direction: [f64; D],
+) -> Vec<f64> {
+    let bodies = model.deck.bodies.len();
+    let (mut low, mut high) = (vec![f64::INFINITY; bodies], vec![f64::NEG_INFINITY; bodies]);
+    for p in 0..points.len() {
+        let (x, half) = (&points.position[p], &points.half_length[p]);
+        let along: f64 = (0..D).map(|a| x[a] * direction[a]).sum();
+        let reach: f64 = (0..D).map(|a| (half[a] * direction[a]).abs()).sum();
+        let body = points.body[p] as usize;
+        low[body] = low[body].min(along - reach);
+        high[body] = high[body].max(along + reach);
+    }
+    let height = |body: usize| world.max(high[body]) - world.min(low[body]);
+    (0..bodies).map(height).collect()
+}
+
+/// The time step and the number of steps. Collective.
+pub fn steps<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> (Option<String>, f64) {
+    let analysis = &model.deck.analysis;
+    if let Some(steps) = analysis.steps {
+        let text = analysis
+            .duration
+            .map(|duration| format!("{} s, {steps} steps", rough(duration / steps as f64)));
+        return (text, steps as f64);
+    }
+    let times = TimeSteps::new(analysis);
+    let mass = model.deck.method.mass;
+    let limit = stability_limit(world, &model.grid, &model.materials, mass, points).0;
+    let Some(StepSpan { time_start, time_end, .. }) = times.next(limit) else {
+        return (None, 0.0);
+    };
+    let dt = time_end - time_start;
+    let steps = analysis.duration.unwrap_or(1.0) / dt;
+    let text = format!(
+        "{} s at the start (cfl = {} of a limit of {} s), about {} steps",
+        rough(dt),
+        analysis.cfl.unwrap_or(1.0),
+        rough(limit),
+        rough(steps.round())
+    );
+    (Some(text), steps)
+}
+
+/// Frames that a run of so many steps writes, the first state among them.
+pub fn frames(every: Every, steps: f64, duration: Option<f64>) -> f64 {
+    match every {
+        Every::Steps(every) => 1.0 + (steps / every.max(1) as f64).ceil(),
+        Every::Seconds(seconds) => 1.0 + (duration.unwrap_or(1.0) / seconds).ceil().min(steps),
+    }
+}
+
+/// A warning of absurd sizes.
+pub fn much_output(bytes: f64, frames: f64) -> Option<String> {
+    (bytes > MUCH_OUTPUT).then(|| {
+        format!(
+            "{} frames will fill about {}; choose a longer interval (output.every, or \
+             output.every = {{ seconds = ... }}), fewer output.fields or a larger cell",
+            rough(frames),
+            crate::output::terminal::report::bytes(bytes.min(1e18) as u64)
+        )
+    })
+}
