@@ -410,7 +410,7 @@ fn checks_of_bodies_and_shapes() {
             (&["material.steel.yield=1"], "only for model = \"von-mises\""),
             (
                 &["material.steel.model=von-mises"],
-                "material.steel.yield: missing a number > 0; model = \"von-mises\" needs it, or \
+                "material.steel.yield: missing a number or an expression (string) of X Y Z > 0; model = \"von-mises\" needs it, or \
                  yield_stress (uniaxial), or shear_strength",
             ),
             (

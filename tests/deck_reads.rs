@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use mpm_par::deck::model::*;
-use mpm_par::deck::{self, Deck};
-use mpm_par::material::Material;
+use mpm_par::deck::{self, Deck, Scope};
 
 const BEAM: &str = include_str!("decks/beam.toml");
 const DYNAMIC: &str = include_str!("decks/collision.toml");
@@ -28,7 +27,8 @@ fn beam_becomes_a_deck() {
     assert_eq!(deck.method.drop_below, 0.0);
     let ghost = deck.ghost.as_ref().expect("given");
     assert_eq!((ghost.stiffness, ghost.scaling), (Some(12e6), GhostScaling::Published));
-    assert_eq!(deck.materials[0].model, MaterialModel::Hencky { young: 12e6, poisson: 0.2 });
+    assert_eq!(deck.materials[0].model.name, "hencky");
+    assert_eq!(deck.materials[0].values(&Scope::default()), [12e6, 0.2]);
     assert_eq!(deck.boundaries[0].place, Place::Side { axis: 0, upper: false });
     assert_eq!(deck.boundaries[0].fix, [0]);
     assert_eq!(deck.boundaries[1].name, "boundary-2");
@@ -179,7 +179,7 @@ fn ghost_body_has_the_papers_point_counts() {
 fn strength_in_three_ways() {
     let stress = |set: &str, trial: [f64; 3]| {
         let deck = read(BEAM, &["material.steel.model=von-mises", set]);
-        Material::from_deck(&deck.materials[0].model).respond(trial).stress
+        deck.materials[0].at(&Scope::default()).respond(trial, &[]).stress
     };
     let near = |found: f64, wanted: f64| assert!((found / wanted - 1.0).abs() < 1e-12, "{found}");
     let tension = stress("material.steel.yield_stress=30e3", [0.2, -0.1, -0.1]);

@@ -7,6 +7,7 @@
 //! round-off of the strain it was made from, and that the one of the displacements it is the
 //! difference of. Every term has the unit of a force, and no scale is given from outside.
 
+use crate::material::local;
 use crate::system::terms::stress::StepPoints;
 
 /// Roundings that an entry of the residual may have met, in units of the size of its terms: the
@@ -32,7 +33,8 @@ pub fn sizes<const D: usize>(
     let mut sizes = vec![0.0; nodes];
     for p in 0..step.points.len() {
         let points = step.points;
-        let modulus = step.materials[points.body[p] as usize].elasticity().p_wave_modulus();
+        let modulus =
+            local(step.materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
         let gradients = &step.influences.gradients[step.influences.row(p)];
         let around = step.nodes_of(p);
         let strain: f64 = around

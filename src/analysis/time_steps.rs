@@ -10,7 +10,7 @@
 use crate::deck::model::{Analysis, Mass};
 use crate::error::Result;
 use crate::grid::Grid;
-use crate::material::Material;
+use crate::material::{Material, local};
 use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::points::Points;
@@ -109,7 +109,7 @@ pub fn stability_limit<const D: usize>(
     };
     let (mut rate, mut wave_energy) = (0.0f64, 0.0);
     for p in 0..points.len() {
-        let modulus = materials[points.body[p] as usize].elasticity().p_wave_modulus();
+        let modulus = local(materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
         let wave = modulus * points.volume(p) / points.mass[p];
         let speed = points.velocity[p].iter().map(|v| v * v).sum::<f64>().sqrt();
         rate = rate.max(wave.abs().sqrt() * factor + speed);

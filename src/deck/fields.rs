@@ -1,5 +1,7 @@
 //! Names of point fields that decks may ask for.
 
+use crate::material::state_variables;
+
 /// How many numbers a field has at a point, and how its components are called.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FieldRank {
@@ -26,7 +28,7 @@ impl FieldRank {
     }
 }
 
-/// Fields that can be written; scalars, vector fields and components can be verified.
+/// Fields of every point that can be written; scalars, vector fields and components can be verified.
 pub const FIELDS: [(&str, FieldRank); 22] = [
     ("displacement", FieldRank::Vector),
     ("position", FieldRank::Vector),
@@ -54,7 +56,20 @@ pub const FIELDS: [(&str, FieldRank); 22] = [
     ("rank", FieldRank::Integer),
 ];
 
-/// The names alone.
+/// Names of the fields of every point, and of the state variables of all materials.
+pub fn names() -> Vec<&'static str> {
+    let of_materials = state_variables().into_iter().map(|variable| variable.name);
+    FIELD_NAMES.iter().copied().chain(of_materials).collect()
+}
+
+/// What a field is made of, if there is one of that name.
+pub fn rank(name: &str) -> Option<FieldRank> {
+    let known = FIELDS.iter().find(|(known, _)| *known == name).map(|(_, rank)| *rank);
+    let state = || state_variables().iter().any(|variable| variable.name == name);
+    known.or_else(|| state().then_some(FieldRank::Scalar))
+}
+
+/// Names of the fields of every point.
 pub const FIELD_NAMES: &[&str] = &{
     let mut names = [""; FIELDS.len()];
     let mut i = 0;

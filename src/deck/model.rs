@@ -5,9 +5,10 @@
 
 use std::path::PathBuf;
 
-use super::expression::Expression;
+use super::expression::{Expression, Scope};
 use super::places::Places;
 use super::shape::Shape;
+use crate::material::Entry;
 
 /// A complete, checked input deck.
 #[derive(Debug, Clone, PartialEq)]
@@ -281,32 +282,32 @@ pub enum MeshMotion {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
     pub name: String,
-    pub model: MaterialModel,
+    pub model: &'static Entry,
+    /// One per parameter of the model: a number or a formula of X, Y, Z; `None` where the deck
+    /// leaves it out.
+    pub parameters: Vec<Option<Expression>>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum MaterialModel {
-    /// Hencky elasticity: Pa, -.
-    Hencky { young: f64, poisson: f64 },
-    /// Hencky elasticity with perfect von Mises plasticity; `yield_stress` is rho_y, Pa,
-    /// the radius sqrt(2 J2) of the Kirchhoff stress (Lagrangian eq. 43).
-    VonMises { young: f64, poisson: f64, yield_stress: f64 },
-}
-
-impl MaterialModel {
-    /// Young's modulus, Pa.
-    pub fn young(&self) -> f64 {
-        match *self {
-            MaterialModel::Hencky { young, .. } | MaterialModel::VonMises { young, .. } => young,
-        }
+impl Material {
+    /// Whether a parameter depends on the place.
+    pub fn varies(&self) -> bool {
+        self.parameters.iter().flatten().any(|value| value.as_constant().is_none())
     }
 
-    /// Stress at yield, Pa, if it yields.
-    pub fn strength(&self) -> Option<f64> {
-        match *self {
-            MaterialModel::Hencky { .. } => None,
-            MaterialModel::VonMises { yield_stress, .. } => Some(yield_stress),
-        }
+    /// The model with the parameters that hold at a place.
+    pub fn at(&self, scope: &Scope) -> crate::material::Material {
+        (self.model.make)(&self.values(scope))
+    }
+
+    /// The parameters at a place, in the order of the model's.
+    pub fn values(&self, scope: &Scope) -> Vec<f64> {
+        let given = self.parameters.iter().zip(self.model.parameters);
+        given
+            .map(|(value, known)| match value {
+                Some(value) => value.value(scope),
+                None => known.value_if_absent(),
+            })
+            .collect()
     }
 }
 

@@ -3,6 +3,7 @@
 use super::expression;
 use super::fields::FIELDS;
 use super::schema::{self, Kind, Need, Reader, Section};
+use crate::material::CATALOGUE;
 
 /// A complete deck, which a test reads.
 pub const EXAMPLE: &str = include_str!("example.toml");
@@ -64,6 +65,12 @@ fn fields() -> String {
             rank.components(3).iter().map(|c| format!("`.{c}`")).collect();
         let components = components.join(" ");
         out.push_str(&format!("| `{name}` | {components} |\n"));
+    }
+    for entry in CATALOGUE.iter().filter(|entry| !entry.state.is_empty()) {
+        for variable in entry.state {
+            let (name, unit) = (variable.name, variable.unit);
+            out.push_str(&format!("| `{name}` | state of `{}`, {unit} |\n", entry.name));
+        }
     }
     out
 }

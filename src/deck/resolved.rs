@@ -2,7 +2,7 @@
 
 use super::expression::Expression;
 use super::model::{
-    BodySource, Deck, Every, Grid, Load, MaterialModel, MeshMotion, MeshSource, Place, Seeding,
+    BodySource, Deck, Every, Grid, Load, Material, MeshMotion, MeshSource, Place, Seeding,
 };
 use super::schema::{self, AXES, SIDES};
 use super::shape::{Form, Shape};
@@ -207,16 +207,7 @@ fn grid(w: &mut Writer<'_>, deck: &Deck) {
 fn materials_and_bodies(w: &mut Writer<'_>, deck: &Deck) {
     for material in &deck.materials {
         w.table(&format!("[material.{}]", quote(&material.name)));
-        let (model, young, poisson, yield_stress) = match material.model {
-            MaterialModel::Hencky { young, poisson } => ("hencky", young, poisson, None),
-            MaterialModel::VonMises { young, poisson, yield_stress } => {
-                ("von-mises", young, poisson, Some(yield_stress))
-            }
-        };
-        w.line("material", "model", quote(model));
-        w.line("material", "young", number(young));
-        w.line("material", "poisson", number(poisson));
-        w.optional("material", "yield", yield_stress.map(number));
+        material_keys(w, material);
     }
     for body in &deck.bodies {
         w.table("[[body]]");
@@ -252,6 +243,30 @@ fn materials_and_bodies(w: &mut Writer<'_>, deck: &Deck) {
         }
         w.line("body", "velocity", expressions(&body.velocity));
         w.line("body", "overlap", quote(if body.may_overlap { "allow" } else { "refuse" }));
+    }
+}
+
+/// Model and parameters, those of inner tables together.
+fn material_keys(w: &mut Writer, material: &Material) {
+    w.line("material", "model", quote(material.model.name));
+    let mut tables: Vec<(&str, Vec<(&str, String)>)> = Vec::new();
+    for (parameter, value) in material.model.parameters.iter().zip(&material.parameters) {
+        let Some(value) = value else { continue };
+        let text = match (value.as_constant(), parameter.words) {
+            (Some(place), words) if !words.is_empty() => quote(words[place as usize]),
+            (Some(value), _) => number(value),
+            (None, _) => quote(value.text()),
+        };
+        match parameter.split() {
+            (None, key) => w.line("material", key, text),
+            (Some(table), key) => match tables.iter_mut().find(|(known, _)| *known == table) {
+                Some((_, pairs)) => pairs.push((key, text)),
+                None => tables.push((table, vec![(key, text)])),
+            },
+        }
+    }
+    for (table, pairs) in tables {
+        w.line("material", table, inline(&pairs));
     }
 }
 

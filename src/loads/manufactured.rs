@@ -11,7 +11,7 @@ use crate::deck::Scope;
 use crate::deck::expression::{Expression, Jet, Smooth};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
-use crate::material::Material;
+use crate::material::LocalMaterial;
 use crate::mechanics::{self, StepStart};
 
 /// A displacement field of X and s (or t) with its derivatives.
@@ -31,13 +31,15 @@ impl Manufactured {
     /// The displacement, m, and the Kirchhoff stress, Pa, of the solution at a place.
     pub fn solution<const D: usize>(
         &self,
-        material: &Material,
+        material: LocalMaterial<'_>,
         scope: &Scope,
     ) -> ([f64; D], Matrix3<f64>) {
         let jets: [Jet; D] = self.jets(scope);
         let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
+        let state = &material.model().initial_state()[..];
         let start = StepStart {
             material,
+            state,
             deformation_gradient: &unit,
             elastic_excess: &none,
             volume_initial: 1.0,
@@ -52,12 +54,18 @@ impl Manufactured {
 
     /// Force per initial volume, N/m3, at the place and load factor in `scope`. Error: the field
     /// makes the material yield there (the force would depend on the path), or turns it over.
-    pub fn force<const D: usize>(&self, material: &Material, scope: &Scope) -> Result<[f64; D]> {
+    pub fn force<const D: usize>(
+        &self,
+        material: LocalMaterial<'_>,
+        scope: &Scope,
+    ) -> Result<[f64; D]> {
         let jets: [Jet; D] = self.jets(scope);
         let gradient = displacement_gradient(&jets);
         let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
+        let state = &material.model().initial_state()[..];
         let start = StepStart {
             material,
+            state,
             deformation_gradient: &unit,
             elastic_excess: &none,
             volume_initial: 1.0,
@@ -99,14 +107,19 @@ fn displacement_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::Hencky;
+    use crate::material::{Hencky, Material};
 
-    fn first_piola(material: &Material, field: &[Expression], scope: &Scope) -> [[f64; 2]; 2] {
+    fn first_piola(
+        material: LocalMaterial<'_>,
+        field: &[Expression],
+        scope: &Scope,
+    ) -> [[f64; 2]; 2] {
         let made = Manufactured::new(field).expect("smooth");
         let gradient = displacement_gradient::<2>(&made.jets(scope));
         let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
         let start = StepStart {
             material,
+            state: &[],
             deformation_gradient: &unit,
             elastic_excess: &none,
             volume_initial: 1.0,
@@ -117,6 +130,7 @@ mod tests {
     #[test]
     fn force_is_minus_the_divergence_of_the_stress() {
         let material = Material::Hencky(Hencky::new(1000.0, 0.3));
+        let material = LocalMaterial::uniform(&material);
         let field = [
             Expression::parse("0.1*s*sin(2*X)*cos(Y)").expect("valid"),
             Expression::parse("0.2*s*X*Y*Y").expect("valid"),
@@ -126,8 +140,8 @@ mod tests {
             |x: f64, y: f64| Scope { initial: [x, y, 0.0], load_factor: 0.7, ..Scope::default() };
         let step = 1e-5;
         for (x, y) in [(0.3, 0.2), (-0.4, 0.9), (0.0, 0.0)] {
-            let force: [f64; 2] = made.force(&material, &at(x, y)).expect("elastic");
-            let stress = |x, y| first_piola(&material, &field, &at(x, y));
+            let force: [f64; 2] = made.force(material, &at(x, y)).expect("elastic");
+            let stress = |x, y| first_piola(material, &field, &at(x, y));
             for i in 0..2 {
                 let divergence = (stress(x + step, y)[i][0] - stress(x - step, y)[i][0]
                     + stress(x, y + step)[i][1]

@@ -5,7 +5,7 @@ use crate::basis::Influences;
 use crate::deck::Scope;
 use crate::deck::model::{AnalysisType, Load};
 use crate::error::{Error, Result};
-use crate::material::Material;
+use crate::material::{Material, local};
 use crate::points::Points;
 
 use super::manufactured::Manufactured;
@@ -48,7 +48,7 @@ pub fn point_forces<const D: usize>(
                 let Some(manufactured) = manufactured else { continue };
                 for (p, force) in forces.iter_mut().enumerate() {
                     let scope = scope_of(points, p, load_factor, time);
-                    let material = &materials[points.body[p] as usize];
+                    let material = local(materials, points, p);
                     let made: [f64; D] = manufactured.force(material, &scope)?;
                     for (f, b) in force.iter_mut().zip(made) {
                         *f += b * points.volume_initial[p];

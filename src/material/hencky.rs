@@ -1,7 +1,8 @@
 //! tau = lambda tr(eps_e) 1 + 2 mu eps_e (Lagrangian §2: linear between logarithmic elastic
 //! strain and Kirchhoff stress).
 
-use super::Response;
+use super::parameter::{POISSON, Parameter, YOUNG};
+use super::{MOST_STATE, Model, Response};
 
 /// Hencky elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,6 +11,8 @@ pub struct Hencky {
     pub lambda: f64,
     /// Shear modulus, Pa.
     pub mu: f64,
+    /// Young's modulus, Pa.
+    pub young: f64,
 }
 
 impl Hencky {
@@ -18,9 +21,17 @@ impl Hencky {
         Hencky {
             lambda: young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
             mu: young / (2.0 * (1.0 + poisson)),
+            young,
         }
     }
 
+    /// From the bulk modulus and the shear modulus, Pa.
+    pub fn from_moduli(bulk: f64, shear: f64) -> Self {
+        let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
+        Hencky { lambda: bulk - 2.0 / 3.0 * shear, mu: shear, young }
+    }
+
+    /// Bulk modulus, Pa.
     pub fn bulk_modulus(&self) -> f64 {
         self.lambda + 2.0 / 3.0 * self.mu
     }
@@ -37,6 +48,13 @@ impl Hencky {
         strain.map(|e| volumetric + 2.0 * self.mu * e)
     }
 
+    /// Principal elastic strains of principal Kirchhoff stresses. Not finite without stiffness.
+    pub fn strain(&self, stress: [f64; 3]) -> [f64; 3] {
+        let trace = stress[0] + stress[1] + stress[2];
+        let mean = self.lambda / (3.0 * self.lambda + 2.0 * self.mu) * trace;
+        stress.map(|s| (s - mean) / (2.0 * self.mu))
+    }
+
     /// Stored energy per unit of initial volume, J/m3.
     #[inline]
     pub fn energy(&self, strain: [f64; 3]) -> f64 {
@@ -45,8 +63,9 @@ impl Hencky {
         0.5 * self.lambda * trace * trace + self.mu * square
     }
 
+    /// The response without plastic flow; `state` stays what it is.
     #[inline(always)]
-    pub fn respond(&self, trial: [f64; 3]) -> Response {
+    pub fn respond_with(&self, trial: [f64; 3], state: [f64; MOST_STATE]) -> Response {
         let mut tangent = [[self.lambda; 3]; 3];
         for (a, row) in tangent.iter_mut().enumerate() {
             row[a] += 2.0 * self.mu;
@@ -56,8 +75,45 @@ impl Hencky {
             elastic_strain: trial,
             tangent,
             shear: [2.0 * self.mu; 3],
+            state,
             plastic_increment: 0.0,
             dissipation: 0.0,
         }
+    }
+}
+
+impl Model for Hencky {
+    const NAME: &'static str = "hencky";
+    const DOC: &'static str = "Hencky elasticity (Lagrangian §2).";
+    const PARAMETERS: &'static [Parameter] = &[YOUNG, POISSON];
+
+    fn new(parameters: &[f64]) -> Self {
+        Hencky::new(parameters[0], parameters[1])
+    }
+
+    #[inline(always)]
+    fn respond(&self, trial: [f64; 3], _: &[f64]) -> Response {
+        self.respond_with(trial, [0.0; MOST_STATE])
+    }
+
+    fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
+        self.strain(stress)
+    }
+
+    #[inline(always)]
+    fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
+        self.energy(elastic_strain)
+    }
+
+    fn wave_modulus(&self, _: impl FnOnce() -> [f64; 3]) -> f64 {
+        self.p_wave_modulus()
+    }
+
+    fn stiffness(&self) -> f64 {
+        self.young
+    }
+
+    fn symmetric(&self) -> bool {
+        true
     }
 }

@@ -3,81 +3,163 @@
 //! The multiplicative split with the exponential map lets small-strain algorithms act on the
 //! principal values of the trial elastic logarithmic strain (Lagrangian §2). A model turns them
 //! into Kirchhoff stress, elastic strain and the consistent tangent; the axes do not change.
+//! Yield functions act on the Kirchhoff stress: a cohesion c acts as c/J in the Cauchy stress.
 //!
 //! | deck value | type | file | source |
 //! |---|---|---|---|
 //! | `hencky` | [`Hencky`] | `hencky.rs` | Lagrangian §2 |
 //! | `von-mises` | [`VonMises`] | `von_mises.rs` | Lagrangian eq. 43 |
+//!
+//! | file | idea |
+//! |---|---|
+//! | `model.rs` | [`Model`]: what each of them owes |
+//! | `local.rs` | [`LocalMaterial`]: the model with the parameters that hold at a point |
+//! | `parameter.rs` | [`Parameter`]: what it reads from the deck |
+//! | `mod.rs` | the catalogue: a model is one file and one line here |
+//!
+//! Where parameters vary in space, each point carries its own, and the model is made from them
+//! whenever the point responds; where they are numbers, it is made once for the body.
 
 pub mod hencky;
+mod local;
+mod model;
+pub mod parameter;
 pub mod von_mises;
 
 #[cfg(test)]
 mod tests;
 
 pub use hencky::Hencky;
+pub use local::{LocalMaterial, local};
+pub use model::{MOST_STATE, Misfit, Model, Response, StateVariable};
+pub use parameter::Parameter;
 pub use von_mises::VonMises;
 
-use crate::deck::model::MaterialModel;
+/// Makes the enumeration of the models, which dispatches once per point, and their catalogue.
+macro_rules! models {
+    ($( $model:ident ),* $(,)?) => {
+        /// A body's model with its parameters.
+        #[derive(Debug, Clone, Copy)]
+        pub enum Material {
+            $( #[doc = concat!("See [`", stringify!($model), "`].")] $model($model), )*
+        }
 
-/// What a model returns for one point, all in the principal axes of the trial strain.
-#[derive(Debug, Clone, Copy)]
-pub struct Response {
-    /// Principal Kirchhoff stresses, Pa.
-    pub stress: [f64; 3],
-    /// Principal elastic logarithmic strains after the return.
-    pub elastic_strain: [f64; 3],
-    /// d stress_a / d trial_strain_b, Pa.
-    pub tangent: [[f64; 3]; 3],
-    /// (stress_a - stress_b) / (trial_strain_a - trial_strain_b) for the pairs 01, 12, 20, Pa,
-    /// in the form that stays exact where the strains coincide.
-    pub shear: [f64; 3],
-    /// Norm of the plastic logarithmic strain increment.
-    pub plastic_increment: f64,
-    /// Plastic work of the increment per unit of initial volume, J/m3.
-    pub dissipation: f64,
+        /// All models, in the order of the documentation.
+        pub static CATALOGUE: &[Entry] = &[$( Entry {
+            name: <$model as Model>::NAME,
+            doc: <$model as Model>::DOC,
+            parameters: <$model as Model>::PARAMETERS,
+            alternatives: <$model as Model>::ALTERNATIVES,
+            state: <$model as Model>::STATE,
+            check: <$model as Model>::check,
+            make: |parameters| Material::$model(<$model as Model>::new(parameters)),
+        } ),*];
+
+        impl Material {
+            /// The model of `own` parameters in the place of this one's.
+            fn with(&self, own: &[f64]) -> Material {
+                match self {
+                    $( Material::$model(_) => {
+                        Material::$model(<$model as Model>::new(own))
+                    } )*
+                }
+            }
+
+            /// See [`Model::respond`].
+            #[inline(always)]
+            pub fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
+                match self { $( Material::$model(model) => model.respond(trial, state), )* }
+            }
+
+            /// See [`Model::energy`].
+            #[inline(always)]
+            pub fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
+                match self { $( Material::$model(model) => Model::energy(model, elastic_strain), )* }
+            }
+
+            /// See [`Model::elastic_strain`].
+            pub fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
+                match self { $( Material::$model(model) => model.elastic_strain(stress), )* }
+            }
+
+            /// See [`Model::wave_modulus`].
+            pub fn wave_modulus(&self, elastic_strain: impl FnOnce() -> [f64; 3]) -> f64 {
+                match self { $( Material::$model(model) => model.wave_modulus(elastic_strain), )* }
+            }
+
+            /// See [`Model::stiffness`].
+            pub fn stiffness(&self) -> f64 {
+                match self { $( Material::$model(model) => model.stiffness(), )* }
+            }
+
+            /// See [`Model::strength`].
+            pub fn strength(&self) -> Option<f64> {
+                match self { $( Material::$model(model) => model.strength(), )* }
+            }
+
+            /// See [`Model::symmetric`].
+            pub fn symmetric(&self) -> bool {
+                match self { $( Material::$model(model) => model.symmetric(), )* }
+            }
+
+            /// The state variables that it carries.
+            pub fn state(&self) -> &'static [StateVariable] {
+                match self { $(
+                    Material::$model(model) => &<$model as Model>::STATE[..model.state_words()],
+                )* }
+            }
+
+            /// See [`Model::initial_state`].
+            pub fn initial_state(&self) -> [f64; MOST_STATE] {
+                match self { $( Material::$model(model) => model.initial_state(), )* }
+            }
+        }
+    };
 }
 
-/// A material, dispatched once per point batch.
-#[derive(Debug, Clone, Copy)]
-pub enum Material {
-    Hencky(Hencky),
-    VonMises(VonMises),
+models! { Hencky, VonMises }
+
+/// What is known of a model before it has parameters.
+#[derive(Clone, Copy)]
+pub struct Entry {
+    /// Deck value of `model`.
+    pub name: &'static str,
+    pub doc: &'static str,
+    pub parameters: &'static [Parameter],
+    /// See [`Model::ALTERNATIVES`].
+    pub alternatives: &'static [(&'static [&'static str], &'static str)],
+    /// See [`Model::STATE`].
+    pub state: &'static [StateVariable],
+    /// See [`Model::check`].
+    pub check: fn(&[f64]) -> Result<(), Misfit>,
+    /// The model of these parameters.
+    pub make: fn(&[f64]) -> Material,
 }
 
-impl Material {
-    pub fn from_deck(model: &MaterialModel) -> Self {
-        match *model {
-            MaterialModel::Hencky { young, poisson } => {
-                Material::Hencky(Hencky::new(young, poisson))
-            }
-            MaterialModel::VonMises { young, poisson, yield_stress } => {
-                Material::VonMises(VonMises::new(Hencky::new(young, poisson), yield_stress))
-            }
-        }
+impl PartialEq for Entry {
+    fn eq(&self, other: &Self) -> bool {
+        self.name == other.name
     }
+}
 
-    /// Stress, strain and tangent for principal trial strains.
-    #[inline(always)]
-    pub fn respond(&self, trial: [f64; 3]) -> Response {
-        match self {
-            Material::Hencky(model) => model.respond(trial),
-            Material::VonMises(model) => model.respond(trial),
-        }
+impl std::fmt::Debug for Entry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name)
     }
+}
 
-    /// Whether the consistent tangent is symmetric: the flow is associated.
-    pub fn symmetric(&self) -> bool {
-        match self {
-            Material::Hencky(_) | Material::VonMises(_) => true,
-        }
-    }
+/// The model of that name.
+pub fn entry(name: &str) -> Option<&'static Entry> {
+    CATALOGUE.iter().find(|entry| entry.name == name)
+}
 
-    /// The elastic part, for energies and wave speeds.
-    pub fn elasticity(&self) -> &Hencky {
-        match self {
-            Material::Hencky(model) => model,
-            Material::VonMises(model) => &model.elasticity,
+/// All names of state variables, each once.
+pub fn state_variables() -> Vec<StateVariable> {
+    let mut all: Vec<StateVariable> = Vec::new();
+    for variable in CATALOGUE.iter().flat_map(|entry| entry.state) {
+        if !all.iter().any(|known| known.name == variable.name) {
+            all.push(*variable);
         }
     }
+    all
 }

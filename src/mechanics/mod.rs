@@ -25,7 +25,7 @@ pub use update::BATCH;
 use nalgebra::Matrix3;
 
 use crate::deck::model::Frame;
-use crate::material::Material;
+use crate::material::{LocalMaterial, MOST_STATE};
 use crate::tensor::dense::{self, Square};
 
 /// One point's contribution to equilibrium, in the chosen frame y:
@@ -53,12 +53,16 @@ pub struct StressState {
     pub dissipation: f64,
     /// Stored energy per unit of initial volume, J/m3.
     pub stored_energy: f64,
+    /// The material's state variables.
+    pub state: [f64; MOST_STATE],
 }
 
 /// Inputs at a point that stay fixed during a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepStart<'a> {
-    pub material: &'a Material,
+    pub material: LocalMaterial<'a>,
+    /// The material's state variables at the start of the step
+    pub state: &'a [f64],
     /// F_n
     pub deformation_gradient: &'a Matrix3<f64>,
     /// b_e - 1 at the start of the step
@@ -71,7 +75,7 @@ pub struct StepStart<'a> {
 /// or not finite dF gives stresses that are not finite.
 #[inline]
 pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> StressState {
-    update::update(start, increment).state(start.material)
+    update::update(start, increment).state(&start.material)
 }
 
 /// [`stress`] of at most [`BATCH`] points at once, the same to the last bit: `start` gives the
@@ -101,7 +105,7 @@ pub fn contribution<const D: usize>(
         gradient_map: placement.gradient_map,
         volume: placement.volume,
     };
-    (contribution, update.state(start.material))
+    (contribution, update.state(&start.material))
 }
 
 /// How a frame y lies to the current state x: T_ij = scale tau_im (dy/dx)_jm.

@@ -8,7 +8,7 @@ use nalgebra::Matrix3;
 
 use super::tests::{Case, elastic, plastic};
 use crate::deck::model::Frame;
-use crate::material::Material;
+use crate::material::{Hencky, Material};
 use crate::tensor::dense;
 
 type Fourth = [[[[f64; 3]; 3]; 3]; 3];
@@ -78,16 +78,24 @@ fn delta(i: usize, j: usize) -> f64 {
     f64::from(u8::from(i == j))
 }
 
+/// The elastic part of the models tested here.
+fn elasticity(material: &Material) -> &Hencky {
+    match material {
+        Material::Hencky(model) => model,
+        Material::VonMises(model) => &model.elasticity,
+    }
+}
+
 /// Kirchhoff stress and D^alg_ijmn for a trial strain, radial return in tensor form.
 fn small_strain(material: &Material, strain: &Matrix3<f64>) -> (Matrix3<f64>, Fourth) {
-    let elasticity = material.elasticity();
+    let elasticity = elasticity(material);
     let (bulk, two_mu) = (elasticity.lambda + 2.0 / 3.0 * elasticity.mu, 2.0 * elasticity.mu);
     let one = Matrix3::identity();
     let deviator = strain - one * (strain.trace() / 3.0);
     let norm = deviator.norm();
     let (theta, flow) = match material {
-        Material::VonMises(model) if two_mu * norm > model.yield_stress => {
-            (model.yield_stress / (two_mu * norm), deviator / norm)
+        Material::VonMises(model) if two_mu * norm > model.radius => {
+            (model.radius / (two_mu * norm), deviator / norm)
         }
         _ => (1.0, Matrix3::zeros()),
     };
@@ -136,7 +144,7 @@ fn check<const D: usize>(case: &Case<D>) {
             / start_det
     });
 
-    let size = case.material.elasticity().mu;
+    let size = elasticity(&case.material).mu;
     for (frame, expected, stress) in [
         (Frame::Updated, updated, tau / det),
         (Frame::Previous, previous, tau * inverse.transpose() / start_det),

@@ -6,7 +6,7 @@ use nalgebra::Matrix3;
 
 use super::{BATCH, Contribution, StepStart, StressState, contribution, stress, stresses};
 use crate::deck::model::Frame;
-use crate::material::{Hencky, Material, VonMises};
+use crate::material::{Hencky, LocalMaterial, Material, VonMises};
 use crate::tensor::dense::{self, Square};
 use crate::tensor::spectral::exponential;
 
@@ -17,7 +17,7 @@ pub(crate) fn elastic() -> Material {
 }
 
 pub(crate) fn plastic() -> Material {
-    Material::VonMises(VonMises::new(Hencky::new(100.0, 0.3), 5.0))
+    Material::VonMises(VonMises::perfect(Hencky::new(100.0, 0.3), 5.0))
 }
 
 /// Numbers in (-1, 1), the same on every run.
@@ -90,7 +90,8 @@ impl<const D: usize> Case<D> {
 
     pub fn start(&self) -> StepStart<'_> {
         StepStart {
-            material: &self.material,
+            material: LocalMaterial::uniform(&self.material),
+            state: &[],
             deformation_gradient: &self.gradient,
             elastic_excess: &self.excess,
             volume_initial: 0.7,
@@ -300,7 +301,8 @@ fn small_strains_keep_their_digits() {
         let (gradient, mut excess) = (Matrix3::identity(), Matrix3::zeros());
         for _ in 0..10 {
             let start = StepStart {
-                material: &material,
+                material: LocalMaterial::uniform(&material),
+                state: &[],
                 deformation_gradient: &gradient,
                 elastic_excess: &excess,
                 volume_initial: 1.0,
@@ -354,7 +356,8 @@ fn work_is_stored_or_dissipated() {
         let now = dense::embed(&path(k), 1.0);
         let inverse = gradient.try_inverse().expect("the path is regular");
         let start = StepStart {
-            material: &material,
+            material: LocalMaterial::uniform(&material),
+            state: &[],
             deformation_gradient: &gradient,
             elastic_excess: &excess,
             volume_initial: 1.0,

@@ -7,7 +7,7 @@
 use nalgebra::Matrix3;
 
 use super::{StepStart, StressState};
-use crate::material::{Material, Response};
+use crate::material::{LocalMaterial, Response};
 use crate::tensor::Spectrum;
 use crate::tensor::dense::{self, Square};
 use crate::tensor::spectral::ln_1p;
@@ -47,20 +47,21 @@ fn trial<const D: usize>(before: &Matrix3<f64>, increment: &Square<D>) -> Spectr
 pub(crate) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -> Update {
     let trial = trial(start.elastic_excess, increment);
     let logarithms = trial.values.map(ln_1p);
-    let response = start.material.respond(logarithms.map(|e| 0.5 * e));
+    let response = start.material.respond(logarithms.map(|e| 0.5 * e), start.state);
     Update { trial, logarithms, response }
 }
 
 impl Update {
     #[inline(always)]
-    pub(crate) fn state(&self, material: &Material) -> StressState {
+    pub(crate) fn state(&self, material: &LocalMaterial<'_>) -> StressState {
         let response = &self.response;
         StressState {
             kirchhoff_stress: self.trial.compose(response.stress),
             elastic_excess: self.trial.compose(elastic_values(&self.trial, response)),
             plastic_increment: response.plastic_increment,
             dissipation: response.dissipation,
-            stored_energy: material.elasticity().energy(response.elastic_strain),
+            stored_energy: material.energy(response.elastic_strain),
+            state: response.state,
         }
     }
 }
@@ -96,13 +97,14 @@ pub(crate) fn states<'a, const D: usize>(
         *strain = trial.values.map(ln_1p);
     }
     for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {
-        let material = start(k).material;
-        let response = material.respond(values[k].map(|e| 0.5 * e));
+        let StepStart { material, state: before, .. } = start(k);
+        let response = material.respond(values[k].map(|e| 0.5 * e), before);
         stresses[k] = response.stress;
         values[k] = elastic_values(trial, &response);
         state.plastic_increment = response.plastic_increment;
         state.dissipation = response.dissipation;
-        state.stored_energy = material.elasticity().energy(response.elastic_strain);
+        state.stored_energy = material.energy(response.elastic_strain);
+        state.state = response.state;
     }
     for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {
         state.kirchhoff_stress = trial.compose(stresses[k]);

@@ -40,7 +40,7 @@ pub fn migrate_from<const D: usize>(
     }
     let own = points.len();
     let arrived = exchange(world, packed(points, &leaving))?;
-    let words = Points::<D>::record_words();
+    let words = points.record_words();
     points.reserve(arrived.iter().map(|(_, list)| list.len() / words).sum());
     for (_, list) in arrived {
         list.chunks_exact(words).for_each(|record| points.unpack(record));
@@ -73,7 +73,7 @@ pub fn settle<const D: usize>(
     let mut arrived: BTreeMap<usize, Vec<f64>> =
         exchange(world, packed(points, &sent))?.into_iter().collect();
     let wanted = |cell: usize| partition.owner_of_cell(grid, cell) == here;
-    let words = Points::<D>::record_words();
+    let words = points.record_words();
     for rank in (0..world.size()).filter(|&rank| rank != here) {
         let list = arrived.remove(&rank).unwrap_or_default();
         let mut records = list.chunks_exact(words).peekable();
@@ -149,7 +149,7 @@ fn packed<const D: usize>(
 ) -> Vec<(usize, Vec<f64>)> {
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
     leaving.iter().for_each(|&(_, rank)| *counts.entry(rank).or_default() += 1);
-    let words = Points::<D>::record_words();
+    let words = points.record_words();
     let mut lists: BTreeMap<usize, Vec<f64>> =
         counts.into_iter().map(|(rank, count)| (rank, Vec::with_capacity(count * words))).collect();
     for &(p, rank) in leaving {

@@ -29,6 +29,15 @@ impl<'a> Gather<'a> {
             std::mem::swap(spare, values);
         }
     }
+
+    /// As [`Gather::apply`] for rows of `stride` values each.
+    pub fn apply_rows(&mut self, values: &mut Vec<f64>, stride: usize) {
+        let mut next = Vec::with_capacity(stride * with_slack(self.order.len()));
+        for &p in self.order {
+            next.extend_from_slice(&values[p * stride..][..stride]);
+        }
+        *values = next;
+    }
 }
 
 /// Room for this many points and a few that arrive later.
@@ -75,6 +84,14 @@ impl Moves {
             values[to] = values[from];
         }
         values.truncate(self.left);
+    }
+
+    /// As [`Moves::apply`] for rows of `stride` values each.
+    pub fn apply_rows(&self, values: &mut Vec<f64>, stride: usize) {
+        for &(from, to) in &self.from_to {
+            values.copy_within(from * stride..(from + 1) * stride, to * stride);
+        }
+        values.truncate(self.left * stride);
     }
 }
 

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `mod.rs` | the fields, and how a point is packed, moved and reordered |
 //! | `gather.rs` | a field's values in another order |
+//! | `named.rs` | words that a body's material asks for, by name |
 //! | `seed.rs` | deck bodies -> points |
 //! | `sub_cells.rs`, `coverage.rs` | sub-cells of a lattice that a shape fills or cuts |
 //! | `overlap.rs` | are two bodies in one place? |
@@ -14,6 +15,7 @@
 pub mod coverage;
 pub mod file;
 mod gather;
+mod named;
 pub mod overlap;
 pub mod seed;
 mod seed_cells;
@@ -23,9 +25,12 @@ mod sub_cells;
 
 use gather::{Gather, Moves};
 use nalgebra::Matrix3;
+pub use named::Named;
 
 use crate::deck::model::Basis;
 use crate::grid::lattice::CORNER_SIGNS;
+use crate::tensor::Spectrum;
+use crate::tensor::spectral::ln_1p;
 
 /// Declares the struct of arrays and everything that must treat each field alike: packing for
 /// migration and checkpoints, reordering, removal. A field is an array of `f64` words per point.
@@ -42,6 +47,10 @@ macro_rules! point_fields {
             $( $(#[$doc])* pub $name: Vec<$type>, )*
             /// `corners` stays empty: a basis that reads none.
             pub cornerless: bool,
+            /// State variables of the body's material.
+            pub state: Named,
+            /// Parameters of the body's material where they vary in space.
+            pub parameters: Named,
         }
 
         impl<const D: usize> Points<D> {
@@ -50,8 +59,13 @@ macro_rules! point_fields {
                 vec![$( (stringify!($name), $words) ),*]
             }
 
-            /// Words of one packed point: id, body, then the fields.
-            pub fn record_words() -> usize { 2 $( + $words )* }
+            /// Words of one packed point without what its material asks for: id, body, the fields.
+            pub fn base_words() -> usize { 2 $( + $words )* }
+
+            /// Words of one packed point: [`Self::base_words`], then state and parameters.
+            pub fn record_words(&self) -> usize {
+                Self::base_words() + self.state.stride() + self.parameters.stride()
+            }
 
             /// Appends point `p` to `out` as words; integers travel as their bits.
             pub fn pack(&self, p: usize, out: &mut Vec<f64>) {
@@ -61,6 +75,8 @@ macro_rules! point_fields {
                     Some(value) => value.write_words(out),
                     None => out.resize(out.len() + $words, 0.0),
                 } )*
+                out.extend_from_slice(self.state.whole(p));
+                out.extend_from_slice(self.parameters.whole(p));
             }
 
             /// Appends the point held in `words` (length [`Self::record_words`]).
@@ -72,6 +88,8 @@ macro_rules! point_fields {
                 if self.carries(stringify!($name)) {
                     self.$name.push(value);
                 } )*
+                self.state.take(&mut rest);
+                self.parameters.take(&mut rest);
             }
 
             /// Body of a packed point.
@@ -84,6 +102,8 @@ macro_rules! point_fields {
                 self.id.truncate(count);
                 self.body.truncate(count);
                 $( self.$name.truncate(count); )*
+                self.state.truncate(count);
+                self.parameters.truncate(count);
             }
 
             /// Keeps the points `order[0], order[1], ...` in that order and drops the others.
@@ -92,6 +112,8 @@ macro_rules! point_fields {
                 gather.apply(&mut self.id);
                 gather.apply(&mut self.body);
                 $( gather.apply(&mut self.$name); )*
+                self.state.gather(&mut gather);
+                self.parameters.gather(&mut gather);
             }
 
             /// Moves points to other places, and drops those beyond the last.
@@ -99,6 +121,8 @@ macro_rules! point_fields {
                 moves.apply(&mut self.id);
                 moves.apply(&mut self.body);
                 $( moves.apply(&mut self.$name); )*
+                self.state.rearrange(moves);
+                self.parameters.rearrange(moves);
             }
 
             /// Makes room for this many more points: by little where there is none, as an array
@@ -113,6 +137,8 @@ macro_rules! point_fields {
                 $( if self.carries(stringify!($name)) {
                     self.$name.reserve_exact(more);
                 } )*
+                self.state.reserve(more);
+                self.parameters.reserve(more);
             }
 
             /// Appends field `name` of point `p` to `out`; false if there is no such field.
@@ -199,6 +225,11 @@ impl<const D: usize> Points<D> {
     /// V = det F V0 of the last finished step, m3.
     pub fn volume(&self, p: usize) -> f64 {
         self.deformation_gradient[p].determinant() * self.volume_initial[p]
+    }
+
+    /// Principal elastic logarithmic strains of the last finished step.
+    pub fn elastic_strain(&self, p: usize) -> [f64; 3] {
+        Spectrum::of(&self.elastic_excess[p]).values.map(|e| 0.5 * ln_1p(e))
     }
 
     /// Appends a point at rest and unstrained. `half_length` is that of its rectangular domain.
@@ -308,7 +339,7 @@ mod tests {
             assert_eq!(points.corners.len(), carried);
             let mut record = Vec::new();
             points.pack(1, &mut record);
-            assert_eq!(record.len(), Points::<2>::record_words());
+            assert_eq!(record.len(), points.record_words());
             let mut field = Vec::new();
             assert!(points.field_of("corners", 2, &mut field));
             assert_eq!(field.len(), 16);

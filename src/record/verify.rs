@@ -6,7 +6,7 @@ use crate::deck::model::{Verify, VerifyNorm};
 use crate::error::Result;
 use crate::loads::manufactured::Manufactured;
 use crate::loads::point_forces::scope_of;
-use crate::material::Material;
+use crate::material::{Material, local};
 use crate::output::series::point_field::PointField;
 use crate::parallel::World;
 use crate::points::Points;
@@ -105,8 +105,7 @@ pub fn manufactured<const D: usize>(
     let mut sums = [0.0; 4];
     for p in 0..points.len() {
         let scope = scope_of(points, p, load_factor, time);
-        let material = &materials[points.body[p] as usize];
-        let (exact, stress) = field.solution::<D>(material, &scope);
+        let (exact, stress) = field.solution::<D>(local(materials, points, p), &scope);
         let volume = points.volume_initial[p];
         for a in 0..D {
             let found = points.position[p][a] - points.position_initial[p][a];

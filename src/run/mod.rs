@@ -4,10 +4,12 @@
 //! |---|---|
 //! | the stages of a run, in order | `session.rs` |
 //! | deck to points on their ranks | `setup.rs` |
+//! | parameters and state of the points' materials | `materials.rs` |
 //! | what is checked before anything is written | `start_checks/` |
 //! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs` |
 //! | the process that MPI starts | `process.rs` |
 
+mod materials;
 pub mod plan;
 mod plan_checks;
 pub mod process;

@@ -39,13 +39,13 @@ pub fn weight_ratios<const D: usize>(
     let mut rows = Vec::new();
     for (index, body) in model.deck.bodies.iter().enumerate() {
         let weight = body.density * size * heights[index];
-        let material = &model.deck.materials[body.material].model;
-        let young = material.young();
+        let young = model.stiffness[index];
         if weight == 0.0 || young == 0.0 {
             continue;
         }
         let of_young = weight / young;
-        let strength = material.strength();
+        let varies = model.deck.materials[body.material].varies();
+        let strength = if varies { None } else { model.materials[index].strength() };
         let mut text =
             format!("rho g H / E = {} with H = {} m", rough(of_young), rough(heights[index]));
         if let Some(strength) = strength {

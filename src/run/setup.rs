@@ -15,6 +15,7 @@ use crate::points::overlap;
 use crate::points::seed::{self, CellByCell};
 use crate::points::share::Share;
 
+use super::materials::{self, Overview};
 use super::start_checks::memory;
 use crate::parallel::balance::Balance;
 use crate::system::step_system::Model;
@@ -37,7 +38,9 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     let seeding = CellByCell::new(&deck, &grid, first_ids)?;
     parallel::settle(world, &partition, &grid, &mut points, cells, &seeding)?;
     place_point_forces(world, &deck, &grid, &mut points)?;
-    Ok((model_of(deck, grid, partition)?, points))
+    let materials = materials::of_bodies(&deck);
+    materials::equip(world, &deck, &materials, &mut points)?;
+    Ok((model_of(world, deck, grid, partition, materials, &points)?, points))
 }
 
 /// The model and this rank's points as a checkpoint holds them: the stored partition where it
@@ -59,27 +62,28 @@ pub fn restore<const D: usize>(
         Some(partition) => partition,
         None => Partition::build(world, &grid, deck.parallel.brick, &points, None)?,
     };
+    let materials = materials::of_bodies(&deck);
+    materials::equip_restored(world, &deck, &materials, &mut points)?;
     // With the stored partition nothing moves; the points are in the order of their cells.
     parallel::migrate(world, &partition, &grid, &mut points)?;
-    Ok((model_of(deck, grid, partition)?, points))
+    Ok((model_of(world, deck, grid, partition, materials, &points)?, points))
 }
 
-/// Materials and everything else that follows from the deck alone.
+/// Everything that stays the same while points move. Collective.
 fn model_of<const D: usize>(
+    world: &World,
     deck: Deck,
     grid: Grid<D>,
     partition: Partition<D>,
+    materials: Vec<Material>,
+    points: &Points<D>,
 ) -> Result<Model<D>> {
-    let materials = deck
-        .bodies
-        .iter()
-        .map(|body| Material::from_deck(&deck.materials[body.material].model))
-        .collect();
+    let Overview { stiffness, symmetric } = Overview::of(world, &deck, &materials, points);
     let penalties = deck
         .bodies
         .iter()
-        .map(|body| {
-            let young = deck.materials[body.material].model.young();
+        .zip(&stiffness)
+        .map(|(body, &young)| {
             deck.ghost.as_ref().map_or(Penalty { stiffness: 0.0, mass: 0.0 }, |ghost| {
                 Penalty::of_body(ghost, young, body.density)
             })
@@ -91,7 +95,17 @@ fn model_of<const D: usize>(
     });
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
     let balance = Balance::default();
-    Ok(Model { deck, grid, partition, materials, penalties, manufactured, balance })
+    Ok(Model {
+        deck,
+        grid,
+        partition,
+        materials,
+        penalties,
+        stiffness,
+        symmetric,
+        manufactured,
+        balance,
+    })
 }
 
 /// The grid that a deck asks for.

@@ -33,6 +33,10 @@ pub struct Model<const D: usize> {
     pub materials: Vec<Material>,
     /// One per body.
     pub penalties: Vec<Penalty>,
+    /// Mean stiffness scale of each body, Pa: what Ghost stiffness and penalties are factors of.
+    pub stiffness: Vec<f64>,
+    /// Whether the tangent of every material is symmetric in every state.
+    pub symmetric: bool,
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
     pub balance: Balance,
@@ -48,7 +52,7 @@ impl<const D: usize> Model<D> {
     /// deck does not ask for the general path.
     pub fn symmetric(&self) -> bool {
         self.deck.analysis.tangent == Tangent::Auto
-            && self.materials.iter().all(Material::symmetric)
+            && self.symmetric
     }
 
     /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.

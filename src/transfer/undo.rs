@@ -21,6 +21,8 @@ pub struct Snapshot<const D: usize> {
     pub dissipation: Former<f64>,
     pub half_length: Former<[f64; D]>,
     pub corners: Former<[[f64; D]; 8]>,
+    /// State variables, row by row.
+    pub state: Former<f64>,
 }
 
 impl<const D: usize> Snapshot<D> {
@@ -36,6 +38,7 @@ impl<const D: usize> Snapshot<D> {
         self.dissipation.wanted = false;
         self.half_length.wanted = false;
         self.corners.wanted = false;
+        self.state.wanted = false;
     }
 
     /// The points as they were when the step began; they have not been reordered since.
@@ -50,6 +53,7 @@ impl<const D: usize> Snapshot<D> {
         self.dissipation.give_back(&mut points.dissipation);
         self.half_length.give_back(&mut points.half_length);
         self.corners.give_back(&mut points.corners);
+        self.state.give_back(&mut points.state.values);
     }
 }
 

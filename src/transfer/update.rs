@@ -10,14 +10,13 @@ use crate::basis::{cpdi1, cpdi2};
 use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::Result;
 use crate::grid::Grid;
-use crate::material::Material;
+use crate::material::{Material, local};
 use crate::mechanics::{self, BATCH, StepStart, StressState};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::numbering::Numbering;
 use crate::system::terms::stress::{StepPoints, displacement_gradient};
-use crate::tensor::spectral::ln_1p;
-use crate::tensor::{Spectrum, dense};
+use crate::tensor::dense;
 
 use super::undo::{Former, Snapshot};
 
@@ -295,6 +294,7 @@ pub fn respond<const D: usize>(
         before.kirchhoff_stress.set_aside(&mut points.kirchhoff_stress);
         before.plastic_strain.set_aside(&mut points.plastic_strain);
         before.dissipation.set_aside(&mut points.dissipation);
+        before.state.set_aside(&mut points.state.values);
     }
     let before = before.as_deref();
     let mut sum = PointEnergies::default();
@@ -306,7 +306,14 @@ pub fn respond<const D: usize>(
             None => &points.elastic_excess,
         };
         let start = |k: usize| StepStart {
-            material: &materials[points.body[first + k] as usize],
+            material: local(materials, points, first + k),
+            state: match before {
+                Some(before) if points.state.stride() > 0 => {
+                    let former = before.state.values();
+                    points.state.of_former(former, first + k, points.body[first + k])
+                }
+                _ => points.state.of(first + k, points.body[first + k]),
+            },
             deformation_gradient: &points.deformation_gradient[first + k],
             elastic_excess: &elastic[first + k],
             volume_initial: points.volume_initial[first + k],
@@ -321,6 +328,7 @@ pub fn respond<const D: usize>(
             points.kirchhoff_stress[p] = state.kirchhoff_stress;
             points.plastic_strain[p] = strain + state.plastic_increment;
             points.dissipation[p] = lost + state.dissipation;
+            points.state.set(p, &state.state);
             sum.strain += state.stored_energy * points.volume_initial[p];
             sum.plastic += points.dissipation[p] * points.volume_initial[p];
         }
@@ -380,9 +388,8 @@ fn embed<const D: usize>(increment: &[[f64; D]; D]) -> Matrix3<f64> {
 pub fn energies<const D: usize>(points: &Points<D>, materials: &[Material]) -> PointEnergies {
     let mut sum = PointEnergies::default();
     for p in 0..points.len() {
-        let elasticity = materials[points.body[p] as usize].elasticity();
-        let strain = Spectrum::of(&points.elastic_excess[p]).values.map(|e| 0.5 * ln_1p(e));
-        sum.strain += elasticity.energy(strain) * points.volume_initial[p];
+        let energy = local(materials, points, p).energy(points.elastic_strain(p));
+        sum.strain += energy * points.volume_initial[p];
         sum.plastic += points.dissipation[p] * points.volume_initial[p];
         let speed: f64 = points.velocity[p].iter().map(|v| v * v).sum();
         sum.kinetic += 0.5 * points.mass[p] * speed;

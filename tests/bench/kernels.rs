@@ -309,7 +309,8 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         let mut sum = 0.0;
         for p in 0..count {
             let start = StepStart {
-                material: &model.materials[points.body[p] as usize],
+                material: mpm_par::material::local(&model.materials, &points, p),
+                state: &[],
                 deformation_gradient: &points.deformation_gradient[p],
                 elastic_excess: &points.elastic_excess[p],
                 volume_initial: points.volume_initial[p],

@@ -84,6 +84,11 @@ impl<'a> Table<'a> {
         self.entries.iter().find(|entry| entry.key == key).map(|entry| &entry.node)
     }
 
+    /// All keys of its section.
+    pub fn keys(&self) -> impl Iterator<Item = &'static str> {
+        self.section.keys.iter().map(|key| key.name)
+    }
+
     pub fn given(&self, key: &str) -> bool {
         self.node(key).is_some()
     }

@@ -3,7 +3,7 @@
 use super::Table;
 use crate::deck::expression::{Expression, Variable};
 use crate::deck::problems::{Got, Reported, nearest};
-use crate::deck::schema::{Key, Kind, quoted};
+use crate::deck::schema::{Key, Kind, Range, quoted};
 use crate::deck::tree::{Node, Origin, Value};
 use crate::deck::words::Words;
 
@@ -115,6 +115,19 @@ impl Table<'_> {
 
     pub fn expression_if(&self, name: &str) -> Got<Option<Expression>> {
         self.read(name, |key, node| self.expression_in(key, node, Self::variables(key)))
+    }
+
+    /// A number in `range`, or an expression whose value nobody knows yet.
+    pub fn number_or_expression(&self, name: &str, range: Range) -> Got<Option<Expression>> {
+        self.read(name, |key, node| {
+            let found = self.expression_in(key, node, Self::variables(key))?;
+            match found.as_constant() {
+                Some(value) if !range.contains(value) => {
+                    Err(self.mismatch(&Key { kind: Kind::Number, range, ..*key }, node))
+                }
+                _ => Ok(found),
+            }
+        })
     }
 
     /// A formula that must be a string, in the given variables.

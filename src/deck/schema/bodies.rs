@@ -1,11 +1,11 @@
-//! Keys of what is analysed: materials, bodies, shapes, boundaries and loads.
+//! Keys of what is analysed: bodies, shapes, boundaries and loads.
 
 use super::Kind::{
     Choice, Choices, Count, CountOrCounts, Expression, Expressions, Number, Points, Special, Table,
     Text, Vector,
 };
 use super::Need::{Default, Optional, Required};
-use super::{AXES, POSITIVE, Section, at_least, between, inside, key};
+use super::{AXES, POSITIVE, Section, at_least, between, key};
 
 const SHAPES: &str = "an array of shapes";
 const BALL_KEYS: &[super::Key] = &[
@@ -14,27 +14,6 @@ const BALL_KEYS: &[super::Key] = &[
 ];
 
 pub const SECTIONS: &[Section] = &[
-    Section {
-        name: "material",
-        header: "[material.NAME]",
-        doc: "A material, by a name of your own.",
-        keys: &[
-            key("model", Choice(&["hencky", "von-mises"]), Required,
-                "Hencky elasticity, alone or with perfect von Mises plasticity."),
-            key("young", Number, Required, "Young's modulus; zero (none) only in explicit runs.")
-                .unit("Pa").range(at_least(0.0)),
-            key("poisson", Number, Required, "Poisson's ratio.").range(inside(-1.0, 0.5)),
-            key("yield", Number, Optional("von-mises: one of the three, only there"),
-                "rho_y: radius sqrt(2 J2) of the Kirchhoff stress at yield, as in the papers (Lagrangian eq. 43).")
-                .unit("Pa").range(POSITIVE),
-            key("yield_stress", Number, Optional("or yield, or shear_strength"),
-                "sigma_y: stress at yield in uniaxial tension; rho_y = sqrt(2/3) sigma_y.")
-                .unit("Pa").range(POSITIVE),
-            key("shear_strength", Number, Optional("or yield, or yield_stress"),
-                "c_u: stress at yield in pure shear, as of undrained clay; rho_y = sqrt(2) c_u.")
-                .unit("Pa").range(POSITIVE),
-        ],
-    },
     Section {
         name: "body",
         header: "[[body]]",

@@ -4,14 +4,17 @@
 //! |---|---|
 //! | `mod.rs` | what a key is |
 //! | `problem.rs` | keys of the analysis: analysis, method, ghost, grid, outputs |
-//! | `bodies.rs` | keys of what is analysed: materials, bodies, shapes, boundaries, loads |
+//! | `materials.rs` | keys of materials, from what the models declare |
+//! | `bodies.rs` | keys of what is analysed: bodies, shapes, boundaries, loads |
 //!
 //! Known keys, type and range checks, defaults, the resolved deck and `docs/guide/deck.md` all come
 //! from here.
 
 mod bodies;
+pub mod materials;
 mod problem;
 
+pub use crate::material::parameter::{ANY, POSITIVE, Range, at_least, between, inside};
 pub use bodies::SIDES;
 
 /// Components of a direction, in order.
@@ -92,47 +95,6 @@ pub enum Need {
     Default(&'static str),
 }
 
-/// Interval of numbers; the flags say whether an end belongs to it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Range {
-    pub low: f64,
-    pub low_included: bool,
-    pub high: f64,
-    pub high_included: bool,
-}
-
-pub const ANY: Range = between(f64::NEG_INFINITY, f64::INFINITY);
-pub const POSITIVE: Range = Range { low_included: false, ..at_least(0.0) };
-
-pub const fn between(low: f64, high: f64) -> Range {
-    Range { low, low_included: true, high, high_included: true }
-}
-
-pub const fn inside(low: f64, high: f64) -> Range {
-    Range { low, low_included: false, high, high_included: false }
-}
-
-pub const fn at_least(low: f64) -> Range {
-    between(low, f64::INFINITY)
-}
-
-impl Range {
-    pub fn contains(&self, value: f64) -> bool {
-        let above = if self.low_included { value >= self.low } else { value > self.low };
-        let below = if self.high_included { value <= self.high } else { value < self.high };
-        above && below
-    }
-
-    /// Empty for all numbers.
-    pub fn describe(&self) -> String {
-        let low = (self.low > f64::NEG_INFINITY)
-            .then(|| format!("{} {}", if self.low_included { ">=" } else { ">" }, self.low));
-        let high = (self.high < f64::INFINITY)
-            .then(|| format!("{} {}", if self.high_included { "<=" } else { "<" }, self.high));
-        [low, high].into_iter().flatten().collect::<Vec<_>>().join(" and ")
-    }
-}
-
 /// One key of the deck.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
@@ -203,7 +165,8 @@ pub struct Section {
 
 /// All sections, in the order of the documentation.
 pub fn sections() -> impl Iterator<Item = &'static Section> {
-    problem::SECTIONS.iter().chain(bodies::SECTIONS).chain(problem::RESULT_SECTIONS)
+    let problem = problem::SECTIONS.iter().chain(materials::sections());
+    problem.chain(bodies::SECTIONS).chain(problem::RESULT_SECTIONS)
 }
 
 /// The section of that name. Names are fixed in this module, so that it always exists.

@@ -1,12 +1,12 @@
-//! `[material.NAME]` and `[[body]]`.
+//! `[[body]]`.
 
 use std::path::Path;
 
 use super::shapes;
 use crate::deck::expression::Expression;
 use crate::deck::model::{
-    Analysis, AnalysisType, Basis, Body, BodySource, Grid, LatticeGrid, Material, MaterialModel,
-    MeshMotion, MeshSource, Method, Seeding,
+    Analysis, AnalysisType, Basis, Body, BodySource, Grid, LatticeGrid, MeshMotion, MeshSource,
+    Method, Seeding,
 };
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
@@ -26,7 +26,7 @@ pub struct World<'a> {
 const LARGEST: f64 = 1e100;
 
 /// Reports a value whose squares and sums would not be finite.
-fn finite_sums(table: &Table<'_>, key: &str, value: f64) -> Got<f64> {
+pub(super) fn finite_sums(table: &Table<'_>, key: &str, value: f64) -> Got<f64> {
     if value <= LARGEST {
         return Ok(value);
     }
@@ -35,60 +35,6 @@ fn finite_sums(table: &Table<'_>, key: &str, value: f64) -> Got<f64> {
         figure(value)
     );
     Err(table.problem_with_help(key, what, "choose units in which the numbers are smaller"))
-}
-
-pub fn materials(root: &Table<'_>, analysis: Option<&Analysis>) -> Got<Vec<Material>> {
-    let kind = analysis.map(|analysis| analysis.kind);
-    let materials = root.named("material", |name, table| {
-        let model = table.choice_of("model", &["hencky", "von-mises"]);
-        let (young, poisson) = (table.number("young"), table.number("poisson"));
-        let young = young.and_then(|young| finite_sums(&table, "young", young));
-        if young == Ok(0.0) && analysis.is_some_and(|analysis| analysis.cfl.is_some()) {
-            return Err(table.problem_with_help(
-                "young",
-                "expected > 0 Pa: without stiffness there is no stability limit for cfl to divide",
-                "give analysis.steps in place of analysis.cfl",
-            ));
-        }
-        if young == Ok(0.0) && kind.is_some_and(|kind| kind != AnalysisType::Explicit) {
-            return Err(table.problem("young", "expected > 0 Pa: only explicit runs do without"));
-        }
-        let model = if model? == 0 {
-            table.refuse(&STRENGTHS, "only for model = \"von-mises\"")?;
-            MaterialModel::Hencky { young: young?, poisson: poisson? }
-        } else {
-            let yield_stress = yield_radius(&table);
-            MaterialModel::VonMises {
-                young: young?,
-                poisson: poisson?,
-                yield_stress: yield_stress?,
-            }
-        };
-        Ok(Material { name: name.to_string(), model })
-    })?;
-    if materials.is_empty() {
-        return Err(root.missing("material", "expected a [material.NAME]"));
-    }
-    Ok(materials)
-}
-
-/// Three ways to say when a von Mises material yields.
-const STRENGTHS: [&str; 3] = ["yield", "yield_stress", "shear_strength"];
-
-/// rho_y, Pa: sqrt(2 J2) at yield. In uniaxial tension J2 = sigma_y^2 / 3, in pure shear J2 = c_u^2.
-fn yield_radius(table: &Table<'_>) -> Got<f64> {
-    let values = STRENGTHS.map(|key| table.number_if(key));
-    let ratios = [1.0, (2.0_f64 / 3.0).sqrt(), std::f64::consts::SQRT_2];
-    if !STRENGTHS.iter().any(|key| table.given(key)) {
-        let how = "model = \"von-mises\" needs it, or yield_stress (uniaxial), or shear_strength";
-        return Err(table.missing("yield", how));
-    }
-    table.one_of(&STRENGTHS)?;
-    let mut radius = None;
-    for (value, ratio) in values.into_iter().zip(ratios) {
-        radius = value?.map(|value| ratio * value).or(radius);
-    }
-    radius.ok_or_else(|| table.missing("yield", ""))
 }
 
 /// Names of the materials as written, whether or not they are right.

@@ -5,7 +5,8 @@
 //! | `analysis.rs` | analysis, method, conditioning |
 //! | `ghost.rs` | ghost, and what is in force without it |
 //! | `grid.rs` | grid |
-//! | `bodies.rs` | material, body |
+//! | `materials.rs` | material |
+//! | `bodies.rs` | body |
 //! | `shapes.rs` | body.shape |
 //! | `conditions.rs` | boundary, load |
 //! | `restraint.rs` | whether rigid motion is held |
@@ -16,6 +17,7 @@ mod bodies;
 mod conditions;
 mod ghost;
 mod grid;
+mod materials;
 mod restraint;
 mod results;
 mod shapes;
@@ -38,7 +40,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let kind = analysis.as_ref().ok().map(|analysis| analysis.kind);
     let method = root
         .table_or_default("method", |table| analysis::method(&table, ghost.as_ref().ok(), kind));
-    let materials = bodies::materials(&root, analysis.as_ref().ok());
+    let materials = materials::materials(&root, analysis.as_ref().ok());
     let output = root.table_or_default("output", |table| results::output(&table, kind));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = results::petsc(&root);

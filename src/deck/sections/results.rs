@@ -1,7 +1,7 @@
 //! `[[verify]]`, `[output]`, `[parallel]`, `[petsc]`.
 
 use crate::deck::expression::Expression;
-use crate::deck::fields::{FIELD_NAMES, FIELDS, FieldRank};
+use crate::deck::fields::{self, FieldRank};
 use crate::deck::model::{AnalysisType, Checkpoint, Every, Output, Parallel, Verify};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -37,8 +37,8 @@ fn components(table: &Table<'_>, dimension: usize) -> Got<(String, usize)> {
     let unknown = |word: &str, known: &[&str]| {
         Err(table.unknown_word("field", word, known, table.origin("field")))
     };
-    let Some((_, rank)) = FIELDS.iter().find(|(name, _)| *name == base) else {
-        return unknown(&field, FIELD_NAMES);
+    let Some(rank) = fields::rank(base) else {
+        return unknown(&field, &fields::names());
     };
     let known: Vec<String> = match rank {
         FieldRank::Integer => {
@@ -74,7 +74,8 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
     let every = interval(table, "every", "output.every");
     let history = interval(table, "history", "output.history");
     let log = interval(table, "log", "output.log");
-    let fields = table.choices("fields", FIELD_NAMES);
+    let known = fields::names();
+    let fields = table.choices("fields", &known);
     let checkpoint = table.table_if("checkpoint", |t| {
         let (every, minutes, keep) = (t.count_if("every"), t.number_if("minutes"), t.count("keep"));
         if !t.given("every") && !t.given("minutes") {
@@ -84,7 +85,7 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
         }
         Ok(Checkpoint { every: every?, minutes: minutes?, keep: keep? })
     });
-    let fields = fields?.into_iter().map(|at| FIELD_NAMES[at].to_string()).collect();
+    let fields = fields?.into_iter().map(|at| known[at].to_string()).collect();
     Ok(Output {
         every: every?.unwrap_or(Every::Steps(1)),
         history: history?.unwrap_or(Every::Steps(1)),

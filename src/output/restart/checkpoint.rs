@@ -8,7 +8,11 @@
 //! | `owners` | units | rank of each unit of the partition |
 //! | `mesh_positions` | nodes | where a mesh has moved to |
 //! | `points.id`, `points.body`, `points.FIELD` | points | rank after rank, in their order there |
+//! | `text.state` | bodies | names of the state variables of each body's points, if any has some |
+//! | `points.state` | points | their values, in that order |
 //! | `sums` | datasets | checksum of each dataset above, over its rows, from memory |
+//!
+//! Format 1 had no state variables, and the elastic strain b_e in place of b_e - 1: it is read too.
 //!
 //! On as many ranks as wrote it every rank gets its own points back in their order, and the
 //! partition is the stored one: what follows is bit by bit the run without interruption.
@@ -25,10 +29,10 @@ use crate::output::agreement::{all_agree, on_root};
 use crate::output::series::hdf5_reader::FileReader;
 use crate::output::series::hdf5_writer::{FileWriter, Plain};
 use crate::output::whole_file::sync_names;
-use crate::points::Points;
+use crate::points::{Named, Points};
 
 /// Number of the format written here; files of later formats are refused.
-pub const FORMAT: u64 = 1;
+pub const FORMAT: u64 = 2;
 
 /// What is written. Points and grid are those of this rank, the rest is the same on all.
 pub struct Checkpoint<'a, const D: usize> {
@@ -96,6 +100,12 @@ impl<const D: usize> Checkpoint<'_, D> {
                 points.field_of(name, p, &mut values);
             }
             out.rows(&dataset_of(name), words, &values)?;
+        }
+        if points.state.stride() > 0 {
+            let names: Vec<String> =
+                points.state.names().iter().map(|names| names.join(" ")).collect();
+            out.text("text.state", &names.join("\n"))?;
+            out.rows("points.state", points.state.stride(), &points.state.values)?;
         }
         let Writer { file, sums, .. } = out;
         let own = if comm.rank() == 0 { &sums[..] } else { &[] };
@@ -302,17 +312,29 @@ impl Reader<'_> {
         let body = self.rows::<u64>("points.body", first, rows)?;
         let mut fields = Vec::new();
         for (name, words) in Points::<D>::field_words() {
-            let name = dataset_of(name);
+            let mut name = dataset_of(name);
+            // Format 1 stored b_e itself.
+            let whole = dataset_of("elastic_left_cauchy_green");
+            let of_whole = name == dataset_of("elastic_excess") && self.file.has(&whole);
+            if of_whole {
+                name = whole;
+            }
             if !self.file.has(&name) || self.file.shape(&name)? != (total, words) {
                 return Err(Error::File(format!(
                     "it holds no {name} of {words} numbers for {total} points: another version \
                      of the program wrote it"
                 )));
             }
-            fields.push((words, self.rows::<f64>(&name, first, rows)?));
+            let mut values = self.rows::<f64>(&name, first, rows)?;
+            if of_whole {
+                values
+                    .chunks_exact_mut(9)
+                    .for_each(|b| [0, 4, 8].iter().for_each(|&k| b[k] -= 1.0));
+            }
+            fields.push((words, values));
         }
         let mut points = Points::default();
-        let mut record = Vec::with_capacity(Points::<D>::record_words());
+        let mut record = Vec::with_capacity(Points::<D>::base_words());
         for p in 0..rows {
             record.clear();
             record.push(f64::from_bits(id[p]));
@@ -321,6 +343,15 @@ impl Reader<'_> {
                 record.extend_from_slice(&values[p * words..(p + 1) * words]);
             }
             points.unpack(&record);
+        }
+        if self.file.has("points.state") {
+            let names = self.text("text.state")?;
+            let words = |line: &str| line.split_whitespace().map(String::from).collect();
+            points.state = Named::new(names.split('\n').map(words).collect());
+            if self.file.shape("points.state")? != (total, points.state.stride()) {
+                return Err(Error::File("its state variables are not those it names".into()));
+            }
+            points.state.values = self.rows::<f64>("points.state", first, rows)?;
         }
         Ok(points)
     }

@@ -7,6 +7,7 @@
 use nalgebra::Matrix3;
 
 use crate::error::{Error, Result};
+use crate::material::{StateVariable, state_variables};
 use crate::points::Points;
 
 /// Shape of a field's value at one point.
@@ -47,22 +48,36 @@ impl Quantity {
 macro_rules! point_field_table {
     ($( $(#[$doc:meta])* $variant:ident, $name:literal, $quantity:ident, $unit:literal; )*) => {
         /// A field of the material points, named as in `output.fields`.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum PointField { $( $(#[$doc])* $variant, )* }
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        pub enum PointField {
+            $( $(#[$doc])* $variant, )*
+            /// A state variable of a material; zero at points whose material has none of the name.
+            State(StateVariable),
+        }
 
         impl PointField {
+            /// All but the state variables.
             pub const ALL: &'static [PointField] = &[$( PointField::$variant ),*];
 
             pub fn name(self) -> &'static str {
-                match self { $( PointField::$variant => $name ),* }
+                match self {
+                    $( PointField::$variant => $name, )*
+                    PointField::State(variable) => variable.name,
+                }
             }
 
             pub fn quantity(self) -> Quantity {
-                match self { $( PointField::$variant => Quantity::$quantity ),* }
+                match self {
+                    $( PointField::$variant => Quantity::$quantity, )*
+                    PointField::State(_) => Quantity::Scalar,
+                }
             }
 
             pub fn unit(self) -> &'static str {
-                match self { $( PointField::$variant => $unit ),* }
+                match self {
+                    $( PointField::$variant => $unit, )*
+                    PointField::State(variable) => variable.unit,
+                }
             }
         }
     };
@@ -103,7 +118,9 @@ point_field_table! {
 
 impl PointField {
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|field| field.name() == name)
+        let of_points = Self::ALL.iter().copied();
+        let of_materials = state_variables().into_iter().map(PointField::State);
+        of_points.chain(of_materials).find(|field| field.name() == name)
     }
 
     /// The fields of `output.fields`.
@@ -171,6 +188,10 @@ impl PointField {
             PointField::Id => out.push(points.id[p] as f64),
             PointField::Body => out.push(f64::from(points.body[p])),
             PointField::Rank => out.push(0.0),
+            PointField::State(variable) => {
+                let value = points.state.get(p, points.body[p], variable.name);
+                out.push(value.unwrap_or(0.0));
+            }
         }
     }
 

@@ -7,6 +7,7 @@ use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::loads::point_forces::scope_of;
+use crate::material::local;
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
@@ -94,13 +95,13 @@ fn loads<const D: usize>(
                 let Some(field) = &model.manufactured else { continue };
                 let fault = |p: usize| {
                     ends.into_iter().find(|&(s, t)| {
-                        let material = &model.materials[points.body[p] as usize];
+                        let material = local(&model.materials, points, p);
                         let force = field.force::<D>(material, &scope_of(points, p, s, t));
                         !force.is_ok_and(|force| force.iter().all(|f| f.is_finite()))
                     })
                 };
                 of_first_point(world, points, fault, |p, (s, t)| {
-                    let material = &model.materials[points.body[p] as usize];
+                    let material = local(&model.materials, points, p);
                     let why = match field.force::<D>(material, &scope_of(points, p, s, t)) {
                         Err(why) => why.to_string(),
                         Ok(force) => format!(

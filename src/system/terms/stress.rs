@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::basis::{Groups, Influences};
 use crate::deck::model::{Frame, PointVolume};
-use crate::material::Material;
+use crate::material::{Material, local};
 use crate::mechanics::{self, Contribution, StepStart};
 use crate::points::Points;
 use crate::tensor::dense;
@@ -266,7 +266,8 @@ pub(crate) fn respond<const D: usize>(
 ) -> Option<Contribution<D>> {
     let points = step.points;
     let start = StepStart {
-        material: &step.materials[points.body[p] as usize],
+        material: local(step.materials, points, p),
+        state: points.state.of(p, points.body[p]),
         deformation_gradient: &points.deformation_gradient[p],
         elastic_excess: &points.elastic_excess[p],
         volume_initial: match step.volume {
