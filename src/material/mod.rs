@@ -9,6 +9,8 @@
 //! |---|---|---|---|
 //! | `hencky` | [`Hencky`] | `hencky.rs` | Lagrangian §2 |
 //! | `von-mises` | [`VonMises`] | `von_mises.rs` | Lagrangian eq. 43 |
+//! | `tresca` | [`Tresca`] | `tresca.rs` | Mohr-Coulomb without friction |
+//! | `mohr-coulomb` | [`MohrCoulomb`] | `mohr_coulomb.rs` | Clausen et al. 2007 |
 //!
 //! | file | idea |
 //! |---|---|
@@ -23,7 +25,11 @@
 pub mod hencky;
 mod local;
 mod model;
+pub mod mohr_coulomb;
 pub mod parameter;
+#[cfg(test)]
+mod published;
+pub mod tresca;
 pub mod von_mises;
 
 #[cfg(test)]
@@ -32,7 +38,9 @@ mod tests;
 pub use hencky::Hencky;
 pub use local::{LocalMaterial, local};
 pub use model::{MOST_STATE, Misfit, Model, Response, StateVariable};
+pub use mohr_coulomb::MohrCoulomb;
 pub use parameter::Parameter;
+pub use tresca::Tresca;
 pub use von_mises::VonMises;
 
 /// Makes the enumeration of the models, which dispatches once per point, and their catalogue.
@@ -117,7 +125,7 @@ macro_rules! models {
     };
 }
 
-models! { Hencky, VonMises }
+models! { Hencky, VonMises, Tresca, MohrCoulomb }
 
 /// What is known of a model before it has parameters.
 #[derive(Clone, Copy)]
