@@ -11,6 +11,7 @@
 //! | `von-mises` | [`VonMises`] | `von_mises.rs` | Lagrangian eq. 43 |
 //! | `tresca` | [`Tresca`] | `tresca.rs` | Mohr-Coulomb without friction |
 //! | `mohr-coulomb` | [`MohrCoulomb`] | `mohr_coulomb.rs` | Clausen et al. 2007 |
+//! | `drucker-prager` | [`DruckerPrager`] | `drucker_prager.rs` | de Souza Neto et al. 2008, 8.3 |
 //!
 //! | file | idea |
 //! |---|---|
@@ -22,6 +23,7 @@
 //! Where parameters vary in space, each point carries its own, and the model is made from them
 //! whenever the point responds; where they are numbers, it is made once for the body.
 
+pub mod drucker_prager;
 pub mod hencky;
 mod local;
 mod model;
@@ -35,6 +37,7 @@ pub mod von_mises;
 #[cfg(test)]
 mod tests;
 
+pub use drucker_prager::DruckerPrager;
 pub use hencky::Hencky;
 pub use local::{LocalMaterial, local};
 pub use model::{MOST_STATE, Misfit, Model, Response, StateVariable};
@@ -125,7 +128,7 @@ macro_rules! models {
     };
 }
 
-models! { Hencky, VonMises, Tresca, MohrCoulomb }
+models! { Hencky, VonMises, Tresca, MohrCoulomb, DruckerPrager }
 
 /// What is known of a model before it has parameters.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
 
-use super::{Material, Model, MohrCoulomb, Response, Tresca, entry};
+use super::{DruckerPrager, Material, Model, MohrCoulomb, Response, Tresca, entry};
 
 /// E = 100 MPa, nu = 0.3, c = 10 kPa in kPa.
 const ELASTIC: [f64; 2] = [1e5, 0.3];
@@ -11,6 +11,12 @@ const ELASTIC: [f64; 2] = [1e5, 0.3];
 fn mohr_coulomb(friction: f64, dilation: f64, tension: f64) -> Material {
     let all = [ELASTIC[0], ELASTIC[1], friction, dilation, 10.0, tension];
     Material::MohrCoulomb(<MohrCoulomb as Model>::new(&all))
+}
+
+/// `fit`: plane strain, outer, inner.
+fn drucker_prager(friction: f64, dilation: f64, fit: f64) -> Material {
+    let all = [ELASTIC[0], ELASTIC[1], friction, dilation, 10.0, fit];
+    Material::DruckerPrager(<DruckerPrager as Model>::new(&all))
 }
 
 /// A figure with about eight digits.
@@ -110,6 +116,59 @@ fn tresca_is_mohr_coulomb_without_friction() {
         );
         let stress = [-280.0 / 3.0, -280.0 / 3.0, -340.0 / 3.0];
         check(&law, [6e-4, -2e-4, -16e-4], stress, [[1e5 / 1.2; 3]; 3]);
+    }
+}
+
+#[test]
+fn drucker_prager_returns_to_its_cone_and_apex() {
+    let law = drucker_prager(30.0, 10.0, 0.0);
+    check(
+        &law,
+        [2e-4, -1e-4, -12e-4],
+        [-52.286866, -73.864899, -152.984357],
+        [
+            [65326.491, 7784.651, 60529.430],
+            [16627.140, 97952.825, 60488.700],
+            [101794.379, 92911.159, 132266.136],
+        ],
+    );
+    check(&law, [10e-4, 5e-4, 2e-4], [10.0 * 3.0_f64.sqrt(); 3], [[0.0; 3]; 3]);
+    // Triaxial compression and extension at yield: the outer and inner cones meet the pyramid.
+    for (fit, trial) in [(1.0, [3e-4, 3e-4, -20e-4]), (2.0, [8e-4, -10e-4, -10e-4])] {
+        let [a, _, c] = drucker_prager(30.0, 10.0, fit).respond(trial, &[]).stress;
+        near(1.5 * a - 0.5 * c, 10.0 * 3.0_f64.sqrt(), 1e-10);
+    }
+}
+
+#[test]
+fn drucker_prager_owes_on_cone_and_apex() {
+    let mut random = Sequence(3);
+    for law in [
+        drucker_prager(30.0, 10.0, 0.0),
+        drucker_prager(20.0, 20.0, 1.0),
+        drucker_prager(0.0, 0.0, 2.0),
+    ] {
+        let mut smooth = 0;
+        for k in 0..1000 {
+            let mut trial = [random.next(), random.next(), random.next()].map(|e| 1e-3 * e);
+            if k % 10 == 0 {
+                trial[1] = trial[0];
+            }
+            let found = law.respond(trial, &[]);
+            owed(&law, trial, &found);
+            let kind = |by: f64| {
+                let shifted = law.respond(trial.map(|e| e * (1.0 + by)), &[]);
+                (shifted.plastic_increment > 0.0, shifted.shear[0] == 0.0)
+            };
+            if kind(1e-4) == kind(-1e-4) {
+                by_differences(&law, trial, &[]);
+                smooth += 1;
+            }
+        }
+        assert!(smooth > 900, "{smooth}");
+        let tangent = law.respond([2e-4, -1e-4, -12e-4], &[]).tangent;
+        let skew = (tangent[0][1] - tangent[1][0]).abs() + (tangent[0][2] - tangent[2][0]).abs();
+        assert_eq!(law.symmetric(), skew < 1e-9 * ELASTIC[0]);
     }
 }
 
