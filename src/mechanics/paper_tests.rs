@@ -83,6 +83,7 @@ fn elasticity(material: &Material) -> &Hencky {
     match material {
         Material::Hencky(model) => model,
         Material::VonMises(model) => &model.elasticity,
+        other => panic!("{other:?} has no tensor form here"),
     }
 }
 
