@@ -1,7 +1,7 @@
 //! From a checked deck to points on their ranks: seed, partition, migrate, place point forces;
 //! or the same from a checkpoint.
 
-use crate::deck::model::{self, AnalysisType, Initial, Load};
+use crate::deck::model::{self, Initial, Load};
 use crate::deck::{Deck, rough};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
@@ -79,13 +79,6 @@ fn model_of<const D: usize>(
     points: &Points<D>,
 ) -> Result<Model<D>> {
     let Overview { stiffness, symmetric } = Overview::of(world, &deck, &materials, points);
-    if !symmetric && deck.analysis.kind != AnalysisType::Explicit {
-        return Err(Error::Input(format!(
-            "analysis.type = \"{}\" solves symmetric systems, and the tangent of a material is \
-             not: give it dilation = friction, or choose analysis.type = \"explicit\"",
-            deck.analysis.kind.name()
-        )));
-    }
     let penalties = deck
         .bodies
         .iter()

@@ -51,8 +51,7 @@ impl<const D: usize> Model<D> {
     /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the
     /// deck does not ask for the general path.
     pub fn symmetric(&self) -> bool {
-        self.deck.analysis.tangent == Tangent::Auto
-            && self.symmetric
+        self.deck.analysis.tangent == Tangent::Auto && self.symmetric
     }
 
     /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.
