@@ -7,13 +7,14 @@
 use std::env;
 use std::path::PathBuf;
 
+const PETSC_NAMES: [&str; 2] = ["petsc", "PETSc"];
 const PETSC_VERSIONS: (&str, &str) = ("3.18", "3.19");
 
 fn main() {
     println!("cargo:rerun-if-changed=ffi/petsc.h");
     println!("cargo:rerun-if-changed=build.rs");
 
-    let petsc = ["petsc", "PETSc"]
+    let petsc = PETSC_NAMES
         .iter()
         .find_map(|name| {
             pkg_config::Config::new()
@@ -21,12 +22,19 @@ fn main() {
                 .probe(name)
                 .ok()
         })
-        .unwrap_or_else(|| {
-            missing(
+        .unwrap_or_else(|| match other_petsc() {
+            Some((name, version)) => panic!(
+                "\nPETSc {version} was found (pkg-config module `{name}`), and PETSc {}.x is needed, \
+                 with real scalars and 32-bit indices.\n  try: Debian 12, whose libpetsc-real-dev has \
+                 it; or build PETSc {} from https://petsc.org and put the folder of its PETSc.pc into \
+                 PKG_CONFIG_PATH\n",
+                PETSC_VERSIONS.0, PETSC_VERSIONS.0
+            ),
+            None => missing(
                 "PETSc (real scalars, 32-bit indices, 3.18.x)",
                 "libpetsc-real-dev",
                 "pkg-config modules `petsc` and `PETSc`; set PKG_CONFIG_PATH to add a folder",
-            )
+            ),
         });
     let mpi = build_probe_mpi::probe().unwrap_or_else(|_| {
         missing(
@@ -76,6 +84,14 @@ fn main() {
     bindings
         .write_to_file(&out)
         .unwrap_or_else(|error| panic!("cannot write {}: {error}", out.display()));
+}
+
+/// Name and version of a PETSc that is there and does not suit.
+fn other_petsc() -> Option<(&'static str, String)> {
+    PETSC_NAMES.iter().find_map(|name| {
+        let found = pkg_config::Config::new().cargo_metadata(false).probe(name).ok()?;
+        Some((*name, found.version))
+    })
 }
 
 fn missing<T>(what: &str, package: &str, looked: &str) -> T {

@@ -39,6 +39,15 @@ trap 'stop; trap "[ -z \"\$job\" ] || kill -TERM \$job 2>/dev/null" TERM INT HUP
 $own mpirun -n "$ranks" "$@" &
 job=$!
 [ -z "$asked" ] || stop
+# Should this script be killed outright, the run stops in good order instead of living on unseen.
+# A process that is dead and not yet asked for its exit code still answers signals.
+$own sh -c 'alive() {
+        kill -0 "$1" || return 1
+        case "$(cat "/proc/$1/stat")" in *") Z "*) return 1 ;; esac
+    }
+    while alive "$1" && kill -0 "$2"; do sleep 1; done
+    kill -USR1 "$2"' watch $$ "$job" >/dev/null 2>&1 &
+watch=$!
 # A signal ends the wait, not the job.
 code=0
 wait "$job" || code=$?
@@ -46,4 +55,7 @@ while kill -0 "$job" 2>/dev/null; do
     code=0
     wait "$job" || code=$?
 done
+kill "$watch" 2>/dev/null || true
+# A launcher that was told twice ends by a signal or a crash of its own: the run has failed.
+[ -z "$asked" ] || [ "$code" -le 4 ] || code=1
 exit "$code"

@@ -111,6 +111,13 @@ pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Arguments> {
         Err(e) => return Err(Error::Input(bad_usage(&e.to_string()))),
     };
     let out = words.out.unwrap_or_else(|| default_out(&words.input));
+    if out.to_str().is_none() {
+        return Err(Error::Input(format!(
+            "the results directory {} has a name that is not UTF-8, which HDF5 files cannot have: \
+             give another one by --out DIR",
+            out.display()
+        )));
+    }
     let restart = words.restart.map(|file| match file.to_str() {
         Some("last") => Restart::Last,
         _ => Restart::File(file),
@@ -269,6 +276,19 @@ mod tests {
         assert_eq!(voice("deck.toml"), Voice::Normal);
         assert_eq!(voice("--quiet deck.toml -log_view"), Voice::Quiet);
         assert_eq!(voice("deck.toml -log_view --verbose"), Voice::Verbose);
+    }
+
+    #[test]
+    fn results_go_where_hdf5_can_write() {
+        use std::os::unix::ffi::OsStringExt;
+        let bad = OsString::from_vec(b"out-\xff".to_vec());
+        let deck = OsString::from_vec(b"deck-\xff.toml".to_vec());
+        for words in [vec!["deck.toml".into(), "--out".into(), bad], vec![deck]] {
+            let words = std::iter::once(OsString::from("mpm-par")).chain(words);
+            let error = parse(words).expect_err("not UTF-8");
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains("not UTF-8"), "{error}");
+        }
     }
 
     #[test]

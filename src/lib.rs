@@ -25,6 +25,7 @@
 //! | (d) solvers | [`petsc`] |
 //! | small tensors | [`tensor`] |
 //! | `input.toml` | [`deck`] |
+//! | files that a user names, opened with care | [`input_file`] |
 
 pub mod amg;
 pub mod analysis;
@@ -34,6 +35,7 @@ pub mod deck;
 pub mod error;
 pub mod ghost;
 pub mod grid;
+pub mod input_file;
 pub mod loads;
 pub mod mass;
 pub mod material;

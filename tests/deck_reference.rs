@@ -89,7 +89,7 @@ fn defaults_given_are_defaults_left_out() {
 fn resolved_deck_reads_back_to_the_same_deck() {
     let changes: [&[&str]; 4] = [
         &[],
-        &["title=\"another\"", "petsc.a_b=[]", "petsc.a_b="],
+        &["title=\"another\"", "petsc.qs_a=[]", "petsc.qs_a="],
         &["body.0.density=2e3", "title=\"tab\\t \\\" back \\\\\""],
         &["output.checkpoint={ every = 3, minutes = 2.5 }"],
     ];

@@ -527,9 +527,13 @@ fn results_that_are_in_the_way() {
         assert_eq!(
             second.said(),
             format!(
-                "error: out already holds results ({} files, e.g. domains.xdmf): give --force to \
-                 replace them, --out DIR to write elsewhere, or --restart last to continue",
-                before.len()
+                "error: out already holds results ({} files): give --force to replace them, --out \
+                 DIR to write elsewhere, or --restart last to continue\n    --force replaces: \
+                 domains.xdmf, grid-000001.h5, grid-000002.h5, grid.xdmf, history.csv, log.txt, \
+                 points-000000.h5 to points-000002.h5 (3 files), points.xdmf, \
+                 residuals.csv, resolved.toml, summary.json",
+                // The copy of the deck is that of this run already.
+                before.len() - 1
             )
         );
         assert!(program::contents(&second.folder.path().join("out")) == before);

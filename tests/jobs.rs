@@ -374,3 +374,41 @@ fn tables(out: &Path) -> Vec<(String, Vec<u8>)> {
     found.sort();
     found
 }
+
+/// A run of endless steps on one rank below jobs/mpirun.sh, which has written a checkpoint.
+fn below_mpirun_sh(out: &Path) -> Child {
+    let mut words = vec!["1".to_string(), PROGRAM.to_string()];
+    words.push(deck("restart").display().to_string());
+    words.extend(["--out".to_string(), out.display().to_string()]);
+    words.extend(settings(ENDLESS));
+    words.extend(repeatable(1));
+    let words: Vec<&str> = words.iter().map(String::as_str).collect();
+    let child = start(script("mpirun.sh", &words));
+    wait_until(|| out.join("checkpoint-000005.h5").exists());
+    child
+}
+
+/// The run does not outlive the script that started it, and stops in good order.
+#[test]
+fn killing_mpirun_sh_stops_its_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let child = below_mpirun_sh(&out);
+    Running::signal(child.id() as i32, libc::SIGKILL);
+    end(child);
+    wait_until(|| out.join("summary.json").exists());
+    assert_eq!(summary(&out)["status"], "stopped");
+}
+
+/// Whatever mpirun makes of a second signal, the exit code is one of the program's.
+#[test]
+fn a_second_signal_ends_mpirun_sh_as_a_run_that_failed() {
+    let folder = tempfile::tempdir().unwrap();
+    let child = below_mpirun_sh(&folder.path().join("out"));
+    for _ in 0..2 {
+        Running::signal(child.id() as i32, libc::SIGTERM);
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let output = end(child);
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+}

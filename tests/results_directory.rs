@@ -184,13 +184,15 @@ fn one_run_at_a_time() {
 }
 
 /// Between the program and the system: refuses locks with the error number in `NO_LOCKS`, and
-/// notes in the file `NOTES` which files are brought to the disk and renamed.
+/// notes in the file `NOTES` which files are brought to the disk and renamed. Ends the process before
+/// the removal or renaming in a results directory that `KILL_AT` counts.
 const BETWEEN: &str = r#"
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <errno.h>
 #include <stdio.h>
 #include <stdlib.h>
+#include <string.h>
 #include <unistd.h>
 
 static void note(const char *what, const char *path) {
@@ -203,6 +205,15 @@ static void note_open(int number) {
     snprintf(link, sizeof link, "/proc/self/fd/%d", number);
     if (readlink(link, path, sizeof path - 1) > 0) note("synced", path);
 }
+static void perhaps_end(const char *path) {
+    static int count = 0;
+    const char *at = getenv("KILL_AT");
+    if (at && strstr(path, "/results/") && ++count == atoi(at)) _exit(9);
+}
+int unlink(const char *path) {
+    perhaps_end(path);
+    return ((int (*)(const char *))dlsym(RTLD_NEXT, "unlink"))(path);
+}
 int fsync(int number) {
     note_open(number);
     return ((int (*)(int))dlsym(RTLD_NEXT, "fsync"))(number);
@@ -213,6 +224,7 @@ int fdatasync(int number) {
 }
 int rename(const char *from, const char *to) {
     note("named", to);
+    perhaps_end(to);
     return ((int (*)(const char *, const char *))dlsym(RTLD_NEXT, "rename"))(from, to);
 }
 int flock(int number, int what) {
@@ -277,4 +289,62 @@ fn rows_reach_the_disk_before_their_checkpoint() {
         before.push(line);
     }
     assert_eq!(checkpoints, 6, "{notes}");
+}
+
+/// A results directory run again in place: wherever the run is killed, the deck is there, by its own
+/// name or that of the copy that a run keeps of it.
+#[test]
+fn a_deck_in_its_results_directory_is_never_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = between(folder.path());
+    let (good, out) = (folder.path().join("good"), folder.path().join("results"));
+    let short = ["--set", "analysis.steps=1", "--set", "output.checkpoint="];
+    run_well(1, &deck("restart"), &good, &short);
+    for name in ["input.toml", "resolved.toml"] {
+        let text = fs::read(good.join(name)).unwrap();
+        for at in 1.. {
+            let _ = fs::remove_dir_all(&out);
+            copy(&good, &out);
+            let env = [("LD_PRELOAD", library.as_str()), ("KILL_AT", &at.to_string())];
+            // Another deck than the last one's, so that both copies change.
+            let more = [&short[..], &["--force", "--set", "title=again"]].concat();
+            let output = mpirun(1, &words(&out.join(name), &out, &more, 1), &env);
+            let kept = ["input.toml", "resolved.toml"].map(|name| fs::read(out.join(name)).ok());
+            let whole = kept.contains(&Some(text.clone()));
+            assert!(whole, "{name} is lost when killed at {at}: {}", self::text(&output));
+            assert!(kept[usize::from(name == "resolved.toml")].is_some(), "{name}, {at}");
+            // The new log comes after the decks.
+            let removed = !out.join("summary.json").exists();
+            if removed && out.join("log.txt").exists() {
+                assert!(at > 5, "only {at} moments");
+                break;
+            }
+        }
+    }
+}
+
+/// A restart from an early checkpoint gives up what came later: its frames do not lie beside those of
+/// the new course, and go with its end. A series that is gone is said to be.
+#[test]
+fn frames_of_an_abandoned_course_are_set_aside() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = finished(folder.path());
+    fs::remove_file(out.join("domains.xdmf")).unwrap();
+    let [restart, path] = from(&out, 2);
+    // The new course writes fewer frames, and no checkpoints.
+    let more = ["--set", "output.every=6", "--set", "output.checkpoint=", &restart, &path];
+    let said = text(&run_well(2, &deck("restart"), &out, &more));
+    let missing = "domains.xdmf is not there: the series begins anew after step 2";
+    assert!(said.contains(missing), "{said}");
+    assert!(!said.contains("points.xdmf is not there"), "{said}");
+    let left: Vec<String> = contents(&out).into_keys().collect();
+    let ending = |name: &&String| name.ends_with(".superseded") || name.ends_with(".partial");
+    assert_eq!(left.iter().filter(ending).collect::<Vec<_>>(), Vec::<&String>::new());
+    let points: Vec<&String> = left.iter().filter(|name| name.starts_with("points-")).collect();
+    assert_eq!(
+        points,
+        ["points-000000.h5", "points-000001.h5", "points-000002.h5", "points-000006.h5"]
+    );
+    let series = fs::read_to_string(out.join("points.xdmf")).unwrap();
+    assert_eq!(series.matches("<Grid Name=\"step ").count(), 4, "{series}");
 }

@@ -8,6 +8,7 @@
 //! | `tree.rs` | TOML to values with their places; `--set` |
 //! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |
 //! | `unread.rs` | keys that the deck's choices leave unread |
+//! | `marks.rs` | the text of a deck, and how a message points into it |
 //! | `places.rs` | where each key is written, for faults seen later |
 //! | `sections/` | each section's values and the checks across sections |
 //! | `resolved.rs` | the deck with every default, as TOML |
@@ -19,6 +20,7 @@
 mod crossing;
 pub mod expression;
 pub mod fields;
+mod marks;
 pub mod model;
 pub mod physics;
 mod places;
@@ -45,14 +47,16 @@ pub use shape::Shape;
 pub use unread::is_read;
 
 use crate::error::{Error, Result};
-use problems::{Problems, Sources};
+use marks::Sources;
+use problems::Problems;
 use tree::Origin;
 
 /// Reads and checks a deck. `path` names it in messages, and relative paths inside it start at
 /// its folder; `sets` are the `KEY=VALUE` of `--set`, applied in order before the checks.
 /// Error: up to ten problems, each with its place and what would be right.
 pub fn read(path: &Path, text: &str, sets: &[String]) -> Result<Deck> {
-    let sources = Sources { file: path.display().to_string(), text, sets };
+    let file = path.display().to_string();
+    let sources = Sources { file, text: text.into(), sets: sets.to_vec() };
     let problems = Problems::new(sources);
     let deck = checked(&problems, path, text, sets);
     match (problems.into_error(), deck) {
@@ -62,12 +66,7 @@ pub fn read(path: &Path, text: &str, sets: &[String]) -> Result<Deck> {
     }
 }
 
-fn checked(
-    problems: &Problems<'_>,
-    path: &Path,
-    text: &str,
-    sets: &[String],
-) -> problems::Got<Deck> {
+fn checked(problems: &Problems, path: &Path, text: &str, sets: &[String]) -> problems::Got<Deck> {
     let mut root = tree::parse_document(text).map_err(|(span, message)| {
         let origin = span.map_or(Origin::Nowhere, Origin::Text);
         problems.report(&origin, "", format!("not valid TOML: {message}"), String::new())

@@ -40,6 +40,21 @@ pub struct Deck {
     pub places: Places,
 }
 
+impl Deck {
+    /// The files that the deck names: points of bodies, the mesh.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let points = self.bodies.iter().filter_map(|body| match &body.source {
+            BodySource::File(path) => Some(path.clone()),
+            _ => None,
+        });
+        let mesh = match &self.grid {
+            Grid::Mesh(MeshGrid { source: MeshSource::File(path), .. }) => Some(path.clone()),
+            _ => None,
+        };
+        points.chain(mesh).collect()
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum AnalysisType {
     QuasiStatic,

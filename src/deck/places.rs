@@ -1,14 +1,16 @@
 //! Where each key of a deck is written, for faults that only a later stage can see.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
+use super::marks::Sources;
 use super::tree::{Node, Origin, Value};
 
-/// What a message about a key begins and ends with, by the key's dotted path.
+/// Where the keys are, by their dotted paths; the text itself is kept once.
 #[derive(Debug, Clone, Default)]
 pub struct Places {
-    file: String,
-    marks: BTreeMap<String, (String, String)>,
+    sources: Arc<Sources>,
+    origins: BTreeMap<String, Origin>,
 }
 
 /// The same deck may be written in many ways.
@@ -19,14 +21,14 @@ impl PartialEq for Places {
 }
 
 impl Places {
-    /// Of all keys below `root`; `mark` tells the begin and the end of a message.
-    pub(crate) fn of(root: &Node, mark: impl Fn(&Origin) -> (String, String)) -> Self {
-        let mut places = Places { file: mark(&Origin::Nowhere).0, marks: BTreeMap::new() };
-        places.enter(root, "", &mark);
+    /// Of all keys below `root`.
+    pub(crate) fn of(root: &Node, sources: &Arc<Sources>) -> Self {
+        let mut places = Places { sources: sources.clone(), origins: BTreeMap::new() };
+        places.enter(root, "");
         places
     }
 
-    fn enter(&mut self, node: &Node, path: &str, mark: &impl Fn(&Origin) -> (String, String)) {
+    fn enter(&mut self, node: &Node, path: &str) {
         let below = |key: &str| match path {
             "" => key.to_string(),
             _ => format!("{path}.{key}"),
@@ -43,8 +45,8 @@ impl Places {
             _ => Vec::new(),
         };
         for (path, child) in children {
-            self.marks.insert(path.clone(), mark(&child.origin));
-            self.enter(child, &path, mark);
+            self.enter(child, &path);
+            self.origins.insert(path, child.origin.clone());
         }
     }
 
@@ -53,10 +55,13 @@ impl Places {
     pub fn say(&self, key: &str, message: &str) -> String {
         let mut written = key;
         loop {
-            match (self.marks.get(written), written.rfind('.')) {
-                (Some((place, lines)), _) => return format!("{place}: {key}: {message}{lines}"),
+            match (self.origins.get(written), written.rfind('.')) {
+                (Some(origin), _) => {
+                    let (place, lines) = self.sources.mark(origin);
+                    return format!("{place}: {key}: {message}{lines}");
+                }
                 (None, Some(end)) => written = &written[..end],
-                (None, None) => return format!("{}: {key}: {message}", self.file),
+                (None, None) => return format!("{}: {key}: {message}", self.sources.file),
             }
         }
     }

@@ -1,22 +1,15 @@
 //! What is wrong with a deck: collected, then said with file, line, column and the text itself.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
+use super::marks::Sources;
 use super::places::Places;
 use super::tree::{Node, Origin};
 use crate::error::Error;
 
 /// Problems shown at once.
 const SHOWN: usize = 10;
-
-/// The sources of a deck, for messages.
-#[derive(Debug)]
-pub struct Sources<'a> {
-    /// As the user named the file.
-    pub file: String,
-    pub text: &'a str,
-    pub sets: &'a [String],
-}
 
 #[derive(Debug, PartialEq)]
 struct Problem {
@@ -29,8 +22,8 @@ struct Problem {
 
 /// Collects problems in the order they are found.
 #[derive(Debug)]
-pub struct Problems<'a> {
-    sources: Sources<'a>,
+pub struct Problems {
+    sources: Arc<Sources>,
     found: RefCell<Vec<Problem>>,
 }
 
@@ -41,9 +34,9 @@ pub struct Reported;
 /// A value, or the knowledge that a problem was reported.
 pub type Got<T> = Result<T, Reported>;
 
-impl<'a> Problems<'a> {
-    pub fn new(sources: Sources<'a>) -> Self {
-        Problems { sources, found: RefCell::new(Vec::new()) }
+impl Problems {
+    pub fn new(sources: Sources) -> Self {
+        Problems { sources: Arc::new(sources), found: RefCell::new(Vec::new()) }
     }
 
     /// Reports a problem at `origin` about the dotted `key`; `help` may be empty.
@@ -59,7 +52,7 @@ impl<'a> Problems<'a> {
 
     /// Where the keys below `root` are written.
     pub fn places(&self, root: &Node) -> Places {
-        Places::of(root, |origin| self.sources.mark(origin))
+        Places::of(root, &self.sources)
     }
 
     /// The problems as one error, if there are any.
@@ -76,7 +69,7 @@ impl<'a> Problems<'a> {
         });
         let hidden = found.len().saturating_sub(SHOWN);
         let mut text: Vec<String> =
-            found.iter().take(SHOWN).map(|problem| self.sources.render(problem)).collect();
+            found.iter().take(SHOWN).map(|problem| render(&self.sources, problem)).collect();
         if hidden > 0 {
             text.push(format!("... and {hidden} more"));
         }
@@ -84,59 +77,19 @@ impl<'a> Problems<'a> {
     }
 }
 
-impl Sources<'_> {
-    fn render(&self, problem: &Problem) -> String {
-        let key = match problem.key.as_str() {
-            "" => String::new(),
-            key => format!("{key}: "),
-        };
-        let (place, lines) = self.mark(&problem.origin);
-        let mut out = format!("{place}: {key}{}{lines}", problem.message);
-        for line in problem.help.lines() {
-            out.push_str("\n   = ");
-            out.push_str(line);
-        }
-        out
+/// The problem with its place and the text there.
+fn render(sources: &Sources, problem: &Problem) -> String {
+    let key = match problem.key.as_str() {
+        "" => String::new(),
+        key => format!("{key}: "),
+    };
+    let (place, lines) = sources.mark(&problem.origin);
+    let mut out = format!("{place}: {key}{}{lines}", problem.message);
+    for line in problem.help.lines() {
+        out.push_str("\n   = ");
+        out.push_str(line);
     }
-
-    /// What a message about `origin` begins with, and the lines of text that follow it.
-    fn mark(&self, origin: &Origin) -> (String, String) {
-        match origin {
-            Origin::Nowhere => (self.file.clone(), String::new()),
-            Origin::Set(index) => {
-                let option = self.sets.get(*index).map_or("", String::as_str);
-                (format!("--set {option}"), String::new())
-            }
-            Origin::Text(span) => {
-                let (line, column, content) = self.locate(span.start);
-                let number = line.to_string();
-                let margin = " ".repeat(number.len());
-                let marked = self.text.get(span.clone()).unwrap_or("");
-                let marked = marked.lines().next().unwrap_or("").chars().count().max(1);
-                let indent: String = content
-                    .chars()
-                    .take(column - 1)
-                    .map(|c| if c == '\t' { '\t' } else { ' ' })
-                    .collect();
-                let carets = "^".repeat(marked);
-                (
-                    format!("{}:{line}:{column}", self.file),
-                    format!("\n {margin} |\n {number} | {content}\n {margin} | {indent}{carets}"),
-                )
-            }
-        }
-    }
-
-    /// Line and column from one, and the line itself.
-    fn locate(&self, offset: usize) -> (usize, usize, &str) {
-        let offset = offset.min(self.text.len());
-        let before = self.text.get(..offset).unwrap_or(self.text);
-        let line = before.matches('\n').count() + 1;
-        let start = before.rfind('\n').map_or(0, |at| at + 1);
-        let column = before[start..].chars().count() + 1;
-        let content = self.text[start..].lines().next().unwrap_or("");
-        (line, column, content)
-    }
+    out
 }
 
 /// A number in a message: as people write it, by its power of ten where that would take too many

@@ -12,7 +12,7 @@ use super::schema::{self, Key, Kind, Need, Reader, Section};
 use super::tree::{self, Entry, Node, Origin, Value};
 
 /// Reports the keys of no effect below `root`, or takes them out; the notes say which were.
-pub fn check(problems: &Problems<'_>, root: &mut Node) -> Vec<String> {
+pub fn check(problems: &Problems, root: &mut Node) -> Vec<String> {
     let mut choices = BTreeMap::new();
     for section in schema::sections() {
         for reader in section.keys.iter().flat_map(|key| key.readers) {
@@ -86,7 +86,7 @@ fn entry<'n>(table: &'n Node, name: &str) -> Option<&'n Entry> {
 }
 
 struct Walk<'a> {
-    problems: &'a Problems<'a>,
+    problems: &'a Problems,
     choices: BTreeMap<&'static str, Made>,
     notes: Vec<String>,
 }

@@ -10,6 +10,7 @@ use std::path::Path;
 use rustc_hash::FxHashMap;
 
 use crate::error::{Error, Result};
+use crate::input_file;
 
 use super::check::Draft;
 use super::element;
@@ -45,7 +46,8 @@ fn wrong(path: &Path, message: impl std::fmt::Display) -> Error {
 }
 
 fn parse(path: &Path) -> Result<Contents> {
-    let bytes = std::fs::read(path).map_err(|e| wrong(path, format!("cannot be read: {e}")))?;
+    let bytes = input_file::read(path, input_file::DATA)
+        .map_err(|e| wrong(path, format!("cannot be read: {e}")))?;
     msh::parse(&bytes).map_err(|reason| wrong(path, reason))
 }
 

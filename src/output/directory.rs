@@ -6,36 +6,22 @@ use std::path::{Path, PathBuf};
 use mpi::topology::SimpleCommunicator;
 
 use super::agreement::on_root;
+use super::names::names_in;
+pub use super::names::{
+    DECK, HISTORY, LOG, PASSED_OVER, RESIDUALS, RESOLVED_DECK, SUMMARY, SUPERSEDED,
+};
+use super::ownership::{self, RESOLVED_HEAD, holds, look};
 use super::whole_file::{PARTIAL, cannot_read, cannot_write, write_whole};
 use crate::error::{Error, Result};
 
-/// Fixed names of a results directory.
-pub const SUMMARY: &str = "summary.json";
-pub const HISTORY: &str = "history.csv";
-pub const RESIDUALS: &str = "residuals.csv";
-pub const LOG: &str = "log.txt";
-pub const DECK: &str = "input.toml";
-pub const RESOLVED_DECK: &str = "resolved.toml";
-
-/// Ending of a checkpoint that a restart from an earlier one has made void.
-pub const SUPERSEDED: &str = ".superseded";
-/// Ending of a checkpoint that `--restart last` could not take: not this run's to remove.
-pub const PASSED_OVER: &str = ".passed-over";
-
-/// All names that a run may leave, apart from the numbered ones.
-const NAMES: [&str; 9] = [
-    SUMMARY,
-    HISTORY,
-    RESIDUALS,
-    LOG,
-    DECK,
-    RESOLVED_DECK,
-    "points.xdmf",
-    "grid.xdmf",
-    "domains.xdmf",
-];
-/// `points-000005.h5` and its like.
-const NUMBERED: [&str; 3] = ["points-", "grid-", "checkpoint-"];
+/// What the run reads: no old result of one of these names is removed.
+#[derive(Debug, Clone, Default)]
+pub struct Inputs {
+    /// Text of the deck.
+    pub deck: String,
+    /// The deck and the files that it names.
+    pub files: Vec<PathBuf>,
+}
 
 /// An existing, writable results directory.
 #[derive(Debug, Clone)]
@@ -48,9 +34,16 @@ impl ResultsDirectory {
     /// files in it are left alone.
     ///
     /// # Errors
-    /// `Input` if results exist and `force` is not set, `File` if it cannot be written.
-    pub fn create(path: &Path, force: bool, comm: &SimpleCommunicator) -> Result<Self> {
-        on_root(comm, || prepare(path, force))?;
+    /// `Input` if results exist and `force` is not set; if files have names that this run would
+    /// write and nothing shows that a run wrote them; if one of `inputs` would be removed. `File` if
+    /// the directory cannot be written.
+    pub fn create(
+        path: &Path,
+        force: bool,
+        inputs: &Inputs,
+        comm: &SimpleCommunicator,
+    ) -> Result<Self> {
+        on_root(comm, || prepare(path, force, inputs))?;
         Ok(Self { path: path.to_path_buf() })
     }
 
@@ -69,7 +62,7 @@ impl ResultsDirectory {
     /// of a run that goes on, or was killed.
     pub fn leave_earlier_part(&self, comm: &SimpleCommunicator) -> Result<()> {
         on_root(comm, || {
-            let names = results_in(&self.path)?;
+            let names = names_in(&self.path)?;
             remove(&self.path, names.iter().filter(|n| *n == SUMMARY || n.ends_with(PARTIAL)))
         })
     }
@@ -82,7 +75,9 @@ impl ResultsDirectory {
         self.path.join(name)
     }
 
-    /// Writes the deck as it was read, and as it was understood with every default.
+    /// Writes the deck as it was read, and as it was understood with every default. Each is written
+    /// beside its name and renamed, in this order: the deck that runs may be either of the two, and
+    /// at every moment one of them holds its text. A deck that is there already is left as it is.
     pub fn write_decks(
         &self,
         input: &str,
@@ -90,7 +85,11 @@ impl ResultsDirectory {
         comm: &SimpleCommunicator,
     ) -> Result<()> {
         on_root(comm, || {
-            write_whole(&self.file(DECK), input.as_bytes())?;
+            let deck = self.file(DECK);
+            if !holds(&deck, input) {
+                write_whole(&deck, input.as_bytes())?;
+            }
+            let resolved = format!("{RESOLVED_HEAD}{resolved}");
             write_whole(&self.file(RESOLVED_DECK), resolved.as_bytes())
         })
     }
@@ -103,16 +102,35 @@ pub fn make_folder(path: &Path) -> Result<()> {
     })
 }
 
-fn prepare(path: &Path, force: bool) -> Result<()> {
+fn prepare(path: &Path, force: bool, inputs: &Inputs) -> Result<()> {
     make_folder(path)?;
-    let old = results_in(path)?;
-    if !old.is_empty() && !force {
+    let found = look(path, &inputs.deck)?;
+    let folder = path.display();
+    if !found.unproven.is_empty() {
         return Err(Error::Input(format!(
-            "{} already holds results ({} files, e.g. {}): give --force to replace them, \
-             --out DIR to write elsewhere, or --restart last to continue",
-            path.display(),
-            old.len(),
-            old[0],
+            "{folder} holds files under names that a run writes, and nothing shows that a run of \
+             this program wrote them: {}\n    try: --out DIR to write elsewhere, or move them away; \
+             nothing was changed",
+            ownership::list(&found.unproven),
+        )));
+    }
+    // The two decks are replaced, never removed: the one that runs may be among them.
+    let old: Vec<String> =
+        found.ours.iter().filter(|name| *name != DECK && *name != RESOLVED_DECK).cloned().collect();
+    if !found.ours.is_empty() && !force {
+        return Err(Error::Input(format!(
+            "{folder} already holds results ({} files): give --force to replace them, --out DIR to \
+             write elsewhere, or --restart last to continue\n    --force replaces: {}",
+            found.ours.len(),
+            ownership::list(&found.ours),
+        )));
+    }
+    let needed = ownership::read_by_the_run(path, &old, &inputs.files);
+    if !needed.is_empty() {
+        return Err(Error::Input(format!(
+            "--force would remove from {folder} what this run reads: {}\n    try: --out DIR to write \
+             elsewhere, or move it; nothing was changed",
+            ownership::list(&needed),
         )));
     }
     probe(path)?;
@@ -127,33 +145,6 @@ fn remove<'a>(folder: &Path, names: impl Iterator<Item = &'a String>) -> Result<
         })?;
     }
     Ok(())
-}
-
-/// Sorted names of the files in `path` that a run of this program wrote.
-fn results_in(path: &Path) -> Result<Vec<String>> {
-    let mut names = Vec::new();
-    for entry in fs::read_dir(path).map_err(|reason| cannot_read(path, &reason))? {
-        let entry = entry.map_err(|reason| cannot_read(path, &reason))?;
-        let is_file = entry.file_type().is_ok_and(|kind| !kind.is_dir());
-        if let (true, Ok(name)) = (is_file, entry.file_name().into_string())
-            && is_ours(&name)
-        {
-            names.push(name);
-        }
-    }
-    names.sort();
-    Ok(names)
-}
-
-fn is_ours(name: &str) -> bool {
-    let endings = [PARTIAL, SUPERSEDED, PASSED_OVER];
-    let name = endings.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name);
-    NAMES.contains(&name)
-        || NUMBERED.iter().any(|prefix| {
-            name.strip_prefix(prefix).and_then(|rest| rest.strip_suffix(".h5")).is_some_and(
-                |number| !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit()),
-            )
-        })
 }
 
 /// Permission bits do not tell the whole truth (quota, read-only mounts): write something.
@@ -171,46 +162,52 @@ mod tests {
     use super::*;
 
     #[test]
-    fn knows_its_own_files() {
-        for name in [
-            "summary.json",
-            "points-000005.h5",
-            "grid-000000.h5.partial",
-            "checkpoint-12.h5",
-            "checkpoint-000012.h5.superseded",
-            "checkpoint-000012.h5.passed-over",
-            "points.xdmf.partial",
-        ] {
-            assert!(is_ours(name), "{name}");
-        }
-        for name in [
-            "points-.h5",
-            "points-a.h5",
-            "my-points-000005.h5",
-            "notes.txt",
-            "grid.h5",
-            ".mpm-par.lock",
-        ] {
-            assert!(!is_ours(name), "{name}");
-        }
-    }
-
-    #[test]
     fn existing_results_need_force_and_foreign_files_stay() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a").join("b");
-        prepare(&path, false).unwrap();
+        let inputs = Inputs { deck: "title = \"this\"".into(), files: Vec::new() };
+        prepare(&path, false, &inputs).unwrap();
         fs::write(path.join("notes.txt"), "mine").unwrap();
-        prepare(&path, false).unwrap();
-        fs::write(path.join("summary.json"), "{}").unwrap();
+        fs::write(path.join("input.toml"), &inputs.deck).unwrap();
+        prepare(&path, false, &inputs).unwrap();
+        fs::write(path.join("log.txt"), "mpm-par 0.0.0: ...").unwrap();
+        fs::write(path.join("resolved.toml"), "title = \"that\"").unwrap();
         fs::write(path.join("points-000001.h5"), "").unwrap();
-        let error = prepare(&path, false).unwrap_err();
+        let error = prepare(&path, false, &inputs).unwrap_err();
         assert_eq!(error.exit_code(), 2);
-        assert!(error.to_string().contains("--force"), "{error}");
-        assert!(path.join("summary.json").exists(), "a refusal must not remove anything");
-        prepare(&path, true).unwrap();
-        assert_eq!(results_in(&path).unwrap(), Vec::<String>::new());
+        let text = error.to_string();
+        let list = "--force replaces: log.txt, points-000001.h5, resolved.toml";
+        assert!(text.contains("(3 files)") && text.contains(list), "{text}");
+        assert!(path.join("log.txt").exists(), "a refusal must not remove anything");
+        prepare(&path, true, &inputs).unwrap();
+        assert_eq!(names_in(&path).unwrap(), ["input.toml", "resolved.toml"]);
         assert_eq!(fs::read(path.join("notes.txt")).unwrap(), b"mine");
+    }
+
+    #[test]
+    fn what_nobody_is_known_to_have_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        fs::write(path.join("log.txt"), "dear diary").unwrap();
+        fs::write(path.join("summary.json"), "{\"versions\": {\"mpm-par\": \"0.1.0\"}}").unwrap();
+        for force in [false, true] {
+            let error = prepare(path, force, &Inputs::default()).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            assert!(error.to_string().contains("wrote them: log.txt\n"), "{error}");
+        }
+        assert_eq!(fs::read(path.join("log.txt")).unwrap(), b"dear diary");
+        assert!(path.join("summary.json").exists());
+    }
+
+    #[test]
+    fn what_the_run_reads_is_not_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path();
+        fs::write(path.join("log.txt"), "mpm-par 0.0.0: ...").unwrap();
+        let inputs = Inputs { deck: String::new(), files: vec![path.join("log.txt")] };
+        let error = prepare(path, true, &inputs).unwrap_err();
+        assert!(error.to_string().contains("what this run reads: log.txt"), "{error}");
+        assert!(path.join("log.txt").exists());
     }
 
     #[test]
@@ -218,7 +215,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("taken");
         fs::write(&path, "x").unwrap();
-        let error = prepare(&path, true).unwrap_err();
+        let error = prepare(&path, true, &Inputs::default()).unwrap_err();
         assert_eq!(error.exit_code(), 3);
         assert!(error.to_string().contains("taken"), "{error}");
     }

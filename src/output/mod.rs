@@ -11,6 +11,8 @@
 //! | `start.rs` | what writing asks of the process before MPI starts |
 //! | `agreement.rs` | one rank acts, every rank learns the outcome |
 //! | `whole_file.rs` | files that are whole or absent |
+//! | `names.rs` | the names of all files in a results directory |
+//! | `ownership.rs` | which of them a run is proven to have written |
 //!
 //! Functions that take a communicator are collective: every rank calls them and every rank gets
 //! the same outcome, also when only one of them met the error.
@@ -18,6 +20,8 @@
 pub mod agreement;
 pub mod directory;
 pub mod extent;
+pub mod names;
+pub mod ownership;
 pub mod restart;
 pub mod series;
 pub mod start;

@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::agreement::{all_agree, on_root};
-use super::directory::ResultsDirectory;
+use super::directory::{Inputs, ResultsDirectory};
 use super::extent;
 use super::extent::body_summaries;
 use super::series::grid_file::{GridFrame, GridSeries};
@@ -106,7 +106,8 @@ fn point_count(ranks: usize) -> usize {
 }
 
 fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommunicator) {
-    let directory = ResultsDirectory::create(&folder.join("out"), false, comm).unwrap();
+    let directory =
+        ResultsDirectory::create(&folder.join("out"), false, &Inputs::default(), comm).unwrap();
     let points = share_of_points::<D>(comm);
     let mut series = PointsSeries::create(&directory, PointField::ALL, basis, D);
     let mut grid = GridSeries::create(&directory);
@@ -131,7 +132,9 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
         grid.write(step, 0.1 * step as f64, &frame, comm).unwrap();
     }
     // A restart after step 0 forgets step 5 and writes it again.
-    let mut series = PointsSeries::resume(&directory, PointField::ALL, basis, D, 0, comm).unwrap();
+    let mut series =
+        PointsSeries::resume(&directory, PointField::ALL, basis, D, 0, &mut Log::silent(), comm)
+            .unwrap();
     series.cut(comm).unwrap();
     series.write(5, 0.5, &points, comm).unwrap();
 
@@ -221,7 +224,7 @@ fn solid_series_on_1_to_4_ranks() {
 fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
     let mut log = Log::new(comm);
     log.note("before the directory is known");
-    let directory = ResultsDirectory::create(folder, false, comm).unwrap();
+    let directory = ResultsDirectory::create(folder, false, &Inputs::default(), comm).unwrap();
     log.attach(&directory, false, comm).unwrap();
     log.note("after");
     directory.write_decks("title = 'a'\n", "title = \"a\"\n", comm).unwrap();
@@ -351,19 +354,25 @@ fn errors_reach_every_rank(folder: &Path, comm: &SimpleCommunicator) {
         assert_eq!(error.exit_code(), 3);
         assert!(error.to_string().contains(part), "{error}");
     };
-    file_error(ResultsDirectory::create(&taken, true, comm).unwrap_err(), "taken");
+    file_error(
+        ResultsDirectory::create(&taken, true, &Inputs::default(), comm).unwrap_err(),
+        "taken",
+    );
     file_error(ResultsDirectory::reopen(&folder.join("absent"), comm).unwrap_err(), "absent");
     file_error(FileReader::open(&taken, comm).err().unwrap(), "not a readable HDF5 file");
     file_error(FileReader::open(&folder.join("absent.h5"), comm).err().unwrap(), "No such file");
     let path = folder.join("absent").join("points.h5");
     file_error(FileWriter::create(&path, comm).err().unwrap(), "No such file");
 
-    let directory = ResultsDirectory::create(&folder.join("out"), false, comm).unwrap();
-    Summary::default().write(&directory, comm).unwrap();
-    let error = ResultsDirectory::create(&folder.join("out"), false, comm).unwrap_err();
+    let directory =
+        ResultsDirectory::create(&folder.join("out"), false, &Inputs::default(), comm).unwrap();
+    let versions = [("mpm-par".to_string(), "0.1.0".to_string())].into();
+    Summary { versions, ..Summary::default() }.write(&directory, comm).unwrap();
+    let error =
+        ResultsDirectory::create(&folder.join("out"), false, &Inputs::default(), comm).unwrap_err();
     assert_eq!(error.exit_code(), 2);
     assert!(error.to_string().contains("--force"), "{error}");
-    ResultsDirectory::create(&folder.join("out"), true, comm).unwrap();
+    ResultsDirectory::create(&folder.join("out"), true, &Inputs::default(), comm).unwrap();
 }
 
 #[test]

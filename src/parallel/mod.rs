@@ -12,6 +12,7 @@
 //! | `partition.rs` | owner of each unit, cell and node |
 //! | `migrate.rs` | points to the ranks that own their cells |
 //! | `traffic.rs` | messages, bytes and reductions, counted |
+//! | `launcher.rs` | whether the launcher belongs to this MPI |
 //! | `signals.rs` | SIGTERM and SIGUSR1 as a wish of all ranks |
 
 pub mod balance;
@@ -20,6 +21,7 @@ pub mod cells;
 pub mod diffuse;
 pub mod exchange;
 pub mod halo;
+pub mod launcher;
 pub mod metis;
 pub mod migrate;
 pub mod partition;

@@ -41,14 +41,21 @@ pub(crate) fn unless_shared(comm: &SimpleCommunicator, error: Error) -> Error {
 
 /// For an error that other ranks may not see: they would wait for ever.
 pub(crate) fn end_all(rank: i32, error: &Error) -> ! {
+    end_all_with(rank, "", Some(error))
+}
+
+/// Ends all with the exit code of the `error`, or 0 without one, after a word beside it.
+pub(crate) fn end_all_with(rank: i32, warning: &str, error: Option<&Error>) -> ! {
     if rank != 0 {
         // Where all have failed, the first speaks for all.
         std::thread::sleep(Duration::from_secs(2));
     }
-    let _ = writeln!(std::io::stderr(), "error: {error}");
+    let mut words: Vec<String> = error.map(|error| format!("error: {error}")).into_iter().collect();
+    words.extend((!warning.is_empty()).then(|| warning.to_string()));
+    let _ = writeln!(std::io::stderr(), "{}", words.join("\n"));
     // Time for the line to get out: mpirun has much to say of an abort.
     std::thread::sleep(Duration::from_millis(300));
-    abort_all(error.exit_code())
+    abort_all(error.map_or(0, Error::exit_code))
 }
 
 /// Ends every rank with this exit code. Without a running MPI, ends this process.

@@ -32,10 +32,31 @@ const PLAIN: [&str; 6] = [
     "snes_converged_reason",
 ];
 
-/// The files with options among the words of an argument list can be read. For the rank that reads.
+/// Options that open a file at the start or the end of PETSc, and end the program where they cannot.
+const OPENED: [&str; 8] = [
+    "-history",
+    "-info",
+    "-log",
+    "-log_all",
+    "-log_trace",
+    "-malloc_view",
+    "-malloc_log",
+    "-memory_view",
+];
+
+/// The files with options among the words of an argument list can be read, and those that PETSc opens
+/// by itself can be written. For the rank that reads.
 pub(crate) fn require_readable(words: &[String]) -> Result<()> {
     for pair in words.windows(2) {
         let [option, file] = pair else { continue };
+        if OPENED.contains(&option.as_str()) && !file.starts_with('-') && !expanded_by_petsc(file) {
+            // `-info` has kinds of messages behind the file.
+            let file = file.split(':').next().unwrap_or_default();
+            let outcome = if file.is_empty() { Ok(()) } else { writable(Path::new(file)) };
+            outcome.map_err(|why| {
+                Error::Input(format!("{option} {file}: cannot be written: {why}"))
+            })?;
+        }
         if !WITH_OPTIONS.contains(&option.as_str()) || expanded_by_petsc(file) {
             continue;
         }

@@ -149,6 +149,10 @@ pub fn require_known() -> Result<()> {
     for option in options::unused()? {
         let (name, value) = option.split_once(' ').unwrap_or((&option, ""));
         let bare = name.trim_start_matches('-');
+        if let Some(why) = fatal(bare, value) {
+            problems.push(format!("{option}: {why}"));
+            continue;
+        }
         match judge(bare, value)? {
             Answer::Known => {}
             Answer::Unknown => problems.push(unknown(bare)?),
@@ -159,6 +163,27 @@ pub fn require_known() -> Result<()> {
         }
     }
     if problems.is_empty() { Ok(()) } else { Err(Error::Input(problems.join("\n"))) }
+}
+
+/// Why an option would end in a crash or a standstill inside PETSc (3.18), which it does not see
+/// itself.
+fn fatal(name: &str, value: &str) -> Option<&'static str> {
+    let own = PREFIXES.iter().find_map(|prefix| name.strip_prefix(prefix))?;
+    match without_nesting(own) {
+        "pc_mg_levels" => Some(
+            "the levels of multigrid are made as the system needs them; pc_gamg_coarse_eq_limit \
+             bounds those of gamg",
+        ),
+        "pc_gamg_type" if value == "classical" => {
+            Some("it waits for ever on several ranks: use agg, which is the default")
+        }
+        // An error in the middle of the method leaves a work vector in the place of the solution.
+        "ksp_type" if own == "ksp_type" && value == "chebyshev" => Some(
+            "PETSc frees a vector of it twice when it fails: use cg, and chebyshev in the levels of \
+             multigrid (mg_levels_ksp_type)",
+        ),
+        _ => None,
+    }
 }
 
 #[derive(Debug, PartialEq)]

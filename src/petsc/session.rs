@@ -14,7 +14,7 @@ use std::ptr::null;
 use mpi::environment::Universe;
 use mpi::traits::{Communicator, Root};
 
-use super::abort::{end_all, install_panic_hook};
+use super::abort::{end_all, end_all_with, install_panic_hook};
 use super::check::{agree, check, essence, petsc, remember};
 use super::{files, options, sys};
 use crate::error::{Error, Result};
@@ -95,19 +95,40 @@ impl<'u> Session<'u> {
     }
 }
 
+impl Session<'_> {
+    /// Ends PETSc after a run that came to `outcome`, the same on all ranks, and gives it back. What
+    /// fails in PETSc's end (a profile that cannot be written) does not change how the run ended:
+    /// then all ranks end here, with a warning and the exit code of the run.
+    pub fn end(self, outcome: Result<()>) -> Result<()> {
+        let (rank, ended) = finalize();
+        // PETSc is ended once.
+        std::mem::forget(self);
+        if let Err(error) = ended {
+            let text = format!("warning: PETSc could not be ended in order: {}", essence(&error));
+            end_all_with(rank, &text, outcome.as_ref().err());
+        }
+        outcome
+    }
+}
+
 impl Drop for Session<'_> {
     fn drop(&mut self) {
-        let mut rank = 0;
-        // SAFETY: PETSc was started by this session and MPI is alive (borrow of the universe).
-        let code = unsafe {
-            mpi::ffi::MPI_Comm_rank(mpi::ffi::RSMPI_COMM_WORLD, &mut rank);
-            sys::PetscFinalize()
-        };
-        if let Err(error) = check(code, "PetscFinalize") {
+        if let (rank, Err(error)) = finalize() {
             let text = format!("PETSc could not be ended in order: {}", essence(&error));
             end_all(rank, &Error::Environment(text));
         }
     }
+}
+
+/// This rank, and the outcome of PETSc's end.
+fn finalize() -> (i32, Result<()>) {
+    let mut rank = 0;
+    // SAFETY: PETSc was started by a session and MPI is alive (borrow of the universe).
+    let code = unsafe {
+        mpi::ffi::MPI_Comm_rank(mpi::ffi::RSMPI_COMM_WORLD, &mut rank);
+        sys::PetscFinalize()
+    };
+    (rank, check(code, "PetscFinalize"))
 }
 
 /// The full argument list, program name first.

@@ -1,11 +1,13 @@
 //! Points from a csv file: header `x,y[,z],volume[,vx,vy,vz]`, one point per line.
 
+use std::io::Read;
 use std::path::Path;
 
 use crate::deck::model::{Basis, Body, Deck};
 use crate::deck::{figure, nearest, rough};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
+use crate::input_file;
 
 use super::Points;
 use super::share::Share;
@@ -36,11 +38,11 @@ pub fn read_points<const D: usize>(
         Error::Input(deck.places.say(&key, &message))
     };
     let wrong = |line: u64, what: String| at(path, body, line, &what);
+    let file = input_file::open(path, input_file::DATA).map_err(|e| unreadable(e.into()))?;
     let mut reader = csv::ReaderBuilder::new()
         .trim(csv::Trim::All)
         .comment(Some(b'#'))
-        .from_path(path)
-        .map_err(unreadable)?;
+        .from_reader(file.take(input_file::DATA));
     let headers = match reader.headers() {
         Ok(headers) => headers.clone(),
         Err(error) if error.is_io_error() => return Err(unreadable(error)),
@@ -136,7 +138,7 @@ fn line_of_row(path: &Path, row: usize) -> u64 {
 /// Line of a record: the reader counts those of comments and blanks before it as its own.
 fn line_of(path: &Path, record: &csv::StringRecord) -> u64 {
     let Some(position) = record.position() else { return 0 };
-    let bytes = std::fs::read(path).unwrap_or_default();
+    let bytes = input_file::read(path, input_file::DATA).unwrap_or_default();
     let (before, after) = bytes.split_at(bytes.len().min(position.byte() as usize));
     let ends = before.iter().filter(|&&byte| byte == b'\n').count();
     let skipped = after.split(|&byte| byte == b'\n').take_while(|line| {
@@ -167,6 +169,10 @@ impl Columns {
             rates.join(",")
         );
         let known = || axes.iter().chain(&["volume"]).chain(rates).copied();
+        // A file that was named by mistake may hold what must not appear on a screen or in a log.
+        if !headers.iter().any(|name| known().any(|column| column == name)) {
+            return Err(format!("this is not a file of points: {expected}"));
+        }
         for (at, name) in headers.iter().enumerate() {
             if !known().any(|column| column == name) {
                 // velocity_x, v1_y

@@ -12,9 +12,11 @@ use crate::deck::model::{Checkpoint as Plan, Grid as GridSource, MeshSource};
 use crate::deck::physics::physics;
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
+use crate::input_file;
 use crate::output::agreement::on_root;
 use crate::output::directory::ResultsDirectory;
 use crate::output::directory::{PASSED_OVER, SUPERSEDED};
+use crate::output::names::{names_in, number_of};
 use crate::output::restart::checkpoint::{self, Checkpoint, Refusal, Restored};
 use crate::output::restart::run_state::RunState;
 use crate::output::restart::seal::checksum_of_bytes;
@@ -96,12 +98,14 @@ impl Checkpointer {
             for (_, old) in &known[..excess] {
                 fs::remove_file(old).map_err(|reason| cannot_write(old, &reason))?;
             }
-            for old in superseded_in(&self.directory)? {
-                fs::remove_file(&old).map_err(|reason| cannot_write(&old, &reason))?;
-            }
-            Ok(())
+            remove_superseded_in(&self.directory)
         })?;
         Ok(path)
+    }
+
+    /// Removes what the run has replaced, once it is complete. Collective.
+    pub fn remove_superseded(&self, world: &World) -> Result<()> {
+        on_root(world.comm(), || remove_superseded_in(&self.directory))
     }
 }
 
@@ -114,7 +118,7 @@ pub fn physics_of(world: &World, deck: &Deck) -> Result<String> {
     {
         let mut sum = 0_u64;
         on_root(world.comm(), || {
-            let bytes = fs::read(path).map_err(|reason| {
+            let bytes = input_file::read(path, input_file::DATA).map_err(|reason| {
                 Error::Input(format!("cannot read the mesh {}: {reason}", path.display()))
             })?;
             sum = checksum_of_bytes(&bytes);
@@ -232,8 +236,9 @@ pub fn lies_in(world: &World, checkpoint: &Path, out: &Path) -> bool {
 }
 
 /// Renames checkpoints of later steps than the one continued from. After a named file they belong
-/// to a course of the run that is given up, and the next checkpoint removes them. Those that `last`
-/// has passed over may be worth something to somebody: they stay under their new name.
+/// to a course of the run that is given up; the next checkpoint, or the end of the run, removes them.
+/// Those that `last` has passed over may be worth something to somebody: they stay under their new
+/// name.
 pub fn set_later_aside(
     world: &World,
     out: &Path,
@@ -256,6 +261,22 @@ pub fn set_later_aside(
         }
         // Before the tables are cut: a checkpoint of rows that are gone must not come back.
         sync_names(out);
+        Ok(())
+    })
+}
+
+/// Renames the frames of later steps, once the series no longer name them: they would lie beside those
+/// of the new course. They go with the checkpoints that were set aside.
+pub fn set_later_frames_aside(world: &World, out: &Path, step: usize) -> Result<()> {
+    on_root(world.comm(), || {
+        for name in names_in(out)? {
+            let frame = ["points-", "grid-"].iter().find_map(|begin| number_of(&name, begin));
+            if frame.is_some_and(|number| number > step) {
+                let path = out.join(&name);
+                let aside = out.join(format!("{name}{SUPERSEDED}"));
+                fs::rename(&path, aside).map_err(|reason| cannot_write(&path, &reason))?;
+            }
+        }
         Ok(())
     })
 }
@@ -283,18 +304,26 @@ fn checkpoints_in(folder: &Path) -> Result<Vec<(usize, PathBuf)>> {
     let mut found: Vec<(usize, PathBuf)> = entries(folder)?
         .into_iter()
         .filter_map(|name| {
-            let number = name.strip_prefix("checkpoint-")?.strip_suffix(".h5")?.parse().ok()?;
-            (name == name_of(number)).then(|| (number, folder.join(name)))
+            let number = number_of(&name, "checkpoint-")?;
+            Some((number, folder.join(name)))
         })
         .collect();
     found.sort();
     Ok(found)
 }
 
+fn remove_superseded_in(folder: &Path) -> Result<()> {
+    for old in superseded_in(folder)? {
+        fs::remove_file(&old).map_err(|reason| cannot_write(&old, &reason))?;
+    }
+    Ok(())
+}
+
+/// Checkpoints and frames of a course that was given up.
 fn superseded_in(folder: &Path) -> Result<Vec<PathBuf>> {
-    let names = entries(folder)?;
-    let ours = |name: &String| name.starts_with("checkpoint-") && name.ends_with(SUPERSEDED);
-    let paths = names.into_iter().filter(ours).map(|name| folder.join(name));
+    let names = names_in(folder)?;
+    let paths =
+        names.iter().filter(|name| name.ends_with(SUPERSEDED)).map(|name| folder.join(name));
     Ok(paths.filter(|path| !is_folder(path)).collect())
 }
 

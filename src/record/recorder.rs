@@ -159,8 +159,10 @@ impl Recorder {
                 (
                     History::resume(&directory, layout, history, &mut log, comm)?,
                     Residuals::resume(&directory, residuals, &mut log, comm)?,
-                    PointsSeries::resume(&directory, &fields, basis, dimension, step, comm)?,
-                    GridSeries::resume(&directory, step, comm)?,
+                    PointsSeries::resume(
+                        &directory, &fields, basis, dimension, step, &mut log, comm,
+                    )?,
+                    GridSeries::resume(&directory, step, &mut log, comm)?,
                 )
             }
         };
@@ -558,7 +560,10 @@ impl Recorder {
             versions: self.versions.clone(),
             warnings: self.log.warnings(),
         };
-        let written = summary.write(&self.directory, world.comm());
+        let mut written = summary.write(&self.directory, world.comm());
+        if ending.status == Status::Completed {
+            written = written.and_then(|()| self.checkpointer.remove_superseded(world));
+        }
         (summary, written)
     }
 }

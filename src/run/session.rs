@@ -2,23 +2,24 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::io::{Read as _, Write as _};
+use std::io::Write as _;
 use std::path::Path;
 
 use mpi::environment::Universe;
 use mpi::traits::*;
 
-use crate::cli::{self, Arguments};
+use crate::cli::{self, Arguments, Restart};
 use crate::deck::model::{AnalysisType, Ghost};
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
-use crate::output::directory::ResultsDirectory;
+use crate::input_file;
+use crate::output::directory::{Inputs, ResultsDirectory};
 use crate::output::restart::run_lock::RunLock;
 use crate::output::start;
 use crate::output::summary::Status;
 use crate::output::terminal::log::Log;
 use crate::output::terminal::report::{self, Banner, Failure};
-use crate::parallel::{World, signals};
+use crate::parallel::{World, launcher, signals};
 use crate::petsc::log::Stages;
 use crate::petsc::{self, Session};
 use crate::petsc::{files, known};
@@ -45,7 +46,9 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
     };
     petsc::install_panic_hook();
     let world = World::new(universe.world().duplicate());
-    let outcome = cli::parse(words).and_then(|arguments| match &arguments.print {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let words = world.fail_together(same_on_all_ranks(&world, words));
+    let outcome = words.and_then(cli::parse).and_then(|arguments| match &arguments.print {
         Some(text) => {
             if world.is_root() {
                 println!("{}", text.trim_end());
@@ -64,6 +67,26 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
             error.exit_code()
         }
     }
+}
+
+/// The words, if all ranks were given those of the first: else each would go its own way. The
+/// program's own name may differ.
+fn same_on_all_ranks(world: &World, words: Vec<OsString>) -> Result<Vec<OsString>> {
+    let own: Vec<u8> = words.iter().skip(1).fold(Vec::new(), |mut all, word| {
+        all.extend(word.as_encoded_bytes());
+        all.push(0);
+        all
+    });
+    let mut first = own.clone();
+    world.broadcast_bytes(0, &mut first);
+    if first == own {
+        return Ok(words);
+    }
+    Err(Error::Input(format!(
+        "rank {} was given other arguments than rank 0: expected one command for all ranks, as in \
+         mpirun -n N mpm-par INPUT.toml",
+        world.rank()
+    )))
 }
 
 /// Errors that reach this level are the same on every rank.
@@ -90,11 +113,16 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     if let Some(note) = petsc::blas::note() {
         log.say(&note);
     }
+    let mpi = versions.get("MPI").map_or("", String::as_str);
+    if let Some(text) = launcher::warning(world.size(), mpi, |name| std::env::var(name).ok()) {
+        log.say(&text);
+    }
     let run = Run { world, session: &session, arguments, text, versions, log };
-    match deck.dimension {
+    let outcome = match deck.dimension {
         2 => run.in_space::<2>(deck),
         _ => run.in_space::<3>(deck),
-    }
+    };
+    session.end(outcome)
 }
 
 /// Rank 0 reads; the others hear.
@@ -102,11 +130,8 @@ fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
     let path = &arguments.input;
     let read = if world.is_root() {
         let bytes = match path.to_str() {
-            Some(cli::STANDARD_INPUT) => {
-                let mut bytes = Vec::new();
-                std::io::stdin().read_to_end(&mut bytes).map(|_| bytes)
-            }
-            _ => std::fs::read(path),
+            Some(cli::STANDARD_INPUT) => input_file::read_all(std::io::stdin(), input_file::DECK),
+            _ => input_file::read(path, input_file::DECK),
         };
         bytes.map_err(|reason| {
             Error::Input(format!("cannot read the deck {}: {reason}", path.display()))
@@ -205,7 +230,10 @@ impl Run<'_> {
         let earlier = earlier.map(|resume| (resume.checkpoint.clone(), resume.step));
         let directory = match earlier {
             Some(_) => ResultsDirectory::reopen(out, comm)?,
-            None => ResultsDirectory::create(out, self.arguments.force, comm)?,
+            None => {
+                let inputs = self.inputs(&model.deck);
+                ResultsDirectory::create(out, self.arguments.force, &inputs, comm)?
+            }
         };
         let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
         let (log, versions, into) = (self.log, self.versions, directory.clone());
@@ -213,12 +241,15 @@ impl Run<'_> {
         let mut recorder =
             Recorder::create(world, &model.deck, into, log, versions, checkpointer, resume, voice)?;
         // All of the earlier part is known to fit: now it may be changed.
-        if let (Some((used, step)), Some(choice)) = (earlier, &self.arguments.restart) {
-            checkpointing::set_later_aside(world, out, choice, &used, step)?;
+        if let (Some((used, step)), Some(choice)) = (&earlier, &self.arguments.restart) {
+            checkpointing::set_later_aside(world, out, choice, used, *step)?;
             directory.leave_earlier_part(comm)?;
         }
         directory.write_decks(&self.text, &resolved, comm)?;
         recorder.open(world)?;
+        if let Some((_, step)) = earlier {
+            checkpointing::set_later_frames_aside(world, out, step)?;
+        }
         signals::listen();
         process::before_steps();
         clock.end_setup();
@@ -297,6 +328,18 @@ impl Run<'_> {
             ..Failure::default()
         };
         Err(kind(report::failure(&failure)))
+    }
+}
+
+impl Run<'_> {
+    /// What must outlast the preparation of the results directory.
+    fn inputs(&self, deck: &Deck) -> Inputs {
+        let mut files = deck.files();
+        files.push(self.arguments.input.clone());
+        if let Some(Restart::File(path)) = &self.arguments.restart {
+            files.push(path.clone());
+        }
+        Inputs { deck: self.text.clone(), files }
     }
 }
 

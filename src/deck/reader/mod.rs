@@ -18,7 +18,7 @@ use super::tree::{self, Entry, Node, Origin, Value};
 /// One table of the deck with its section of the schema.
 #[derive(Clone, Copy)]
 pub struct Table<'a> {
-    problems: &'a Problems<'a>,
+    problems: &'a Problems,
     section: &'static Section,
     path: &'a str,
     origin: &'a Origin,
@@ -30,7 +30,7 @@ const NOWHERE: Origin = Origin::Nowhere;
 impl<'a> Table<'a> {
     /// Opens `node` as the section `name`; reports unknown keys. `path` is its dotted path.
     pub fn open(
-        problems: &'a Problems<'a>,
+        problems: &'a Problems,
         section: &'static Section,
         path: &'a str,
         node: &'a Node,
@@ -49,7 +49,7 @@ impl<'a> Table<'a> {
     }
 
     /// The table of an absent section: all defaults.
-    pub fn absent(problems: &'a Problems<'a>, section: &'static Section, path: &'a str) -> Self {
+    pub fn absent(problems: &'a Problems, section: &'static Section, path: &'a str) -> Self {
         Table { problems, section, path, origin: &NOWHERE, entries: &[] }
     }
 
@@ -93,7 +93,7 @@ impl<'a> Table<'a> {
         self.node(key).is_some()
     }
 
-    pub fn problems(&self) -> &'a Problems<'a> {
+    pub fn problems(&self) -> &'a Problems {
         self.problems
     }
 

@@ -71,7 +71,13 @@ impl Table<'_> {
     }
 
     pub fn text_if(&self, name: &str) -> Got<Option<String>> {
-        self.read(name, |key, node| self.text_in(key, node))
+        let text = self.read(name, |key, node| self.text_in(key, node))?;
+        // Names go into headers of tables and into messages, which have one line.
+        if name == "name" && text.as_ref().is_some_and(|text| text.contains(char::is_control)) {
+            let message = "expected a name without line ends and other control characters";
+            return Err(self.problem(name, message));
+        }
+        Ok(text)
     }
 
     pub fn text(&self, name: &str) -> Got<String> {

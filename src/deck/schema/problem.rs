@@ -37,7 +37,7 @@ pub const SECTIONS: &[Section] = &[
             key("output", Table("output"), Optional("all defaults"), "What is written, and when."),
             key("parallel", Table("parallel"), Optional("all defaults"), "Distribution."),
             key("petsc", Special("a table of strings, numbers or true"), Optional("none"),
-                "PETSc options by name without the dash; `true` is a bare flag."),
+                "PETSc options of the solvers (`qs_`, `mass_`, `kappa_`) by name without the dash; `true` is a bare flag. No files, no viewers but the terminal; of other options only `log_view = true`: the command line takes all."),
             key("conditioning", Table("conditioning"),
                 Optional("needed by type = \"conditioning\""), "Rigid motion of the study."),
         ],

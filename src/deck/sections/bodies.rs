@@ -70,6 +70,7 @@ pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
         if names[..index].contains(&names[index]) {
             table.problem("name", format!("another body is called \"{}\"", names[index]));
         }
+        table.text_if("name")?;
         let material = material(&table, &materials);
         let density = density(&table, world);
         let velocity = table.expressions_if("velocity", world.dimension);

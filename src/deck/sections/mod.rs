@@ -10,7 +10,8 @@
 //! | `shapes.rs` | body.shape |
 //! | `conditions.rs` | boundary, load |
 //! | `restraint.rs` | whether rigid motion is held |
-//! | `results.rs` | verify, output, parallel, petsc |
+//! | `results.rs` | verify, output, parallel |
+//! | `petsc.rs` | petsc |
 
 mod analysis;
 mod bodies;
@@ -18,6 +19,7 @@ mod conditions;
 mod ghost;
 mod grid;
 mod materials;
+mod petsc;
 mod restraint;
 mod results;
 mod shapes;
@@ -32,7 +34,7 @@ use super::schema;
 use super::tree::Node;
 
 /// Reads the whole deck; goes on after a problem as long as what follows can be judged.
-pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck> {
+pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let root = Table::open(problems, schema::section(""), "", root)?;
     let title = root.text("title");
     let analysis = root.table("analysis", |table| analysis::analysis(&table));
@@ -43,7 +45,7 @@ pub fn deck(problems: &Problems<'_>, root: &Node, directory: &Path) -> Got<Deck>
     let materials = materials::materials(&root, analysis.as_ref().ok());
     let output = root.table_or_default("output", |table| results::output(&table, kind));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
-    let petsc = results::petsc(&root);
+    let petsc = petsc::petsc(&root);
     // Without the grid the dimension is unknown, and nothing below can be judged.
     let (grid, dimension) = root.table("grid", |table| grid::grid(&table, directory))?;
     let conditioning = analysis::conditioning(&root, analysis.as_ref().ok(), dimension);

@@ -129,6 +129,11 @@ pub fn test(
     Ok(Ok(format))
 }
 
+/// True if the file ends in a whole seal that fits its length; its content is not tested.
+pub fn is_sealed(path: &Path) -> bool {
+    read_seal(path).is_ok_and(|found| found[0] == 1)
+}
+
 fn seal_bytes(format: u64, length: u64, checksum: u64) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     for number in [format, length, checksum] {

@@ -7,6 +7,7 @@ use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfS
 use crate::deck::model::Element;
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
+use crate::output::terminal::log::Log;
 
 /// One rank's share of the active grid. Active nodes are numbered over all ranks, contiguous by
 /// rank: the nodes given here are the next ones after those of the lower ranks.
@@ -60,9 +61,11 @@ impl GridSeries {
     pub fn resume(
         directory: &ResultsDirectory,
         last_step: usize,
+        log: &mut Log,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
-        let series = XdmfSeries::resume(&directory.file("grid.xdmf"), last_step, comm)?;
+        let series =
+            XdmfSeries::resume(&directory.file("grid.xdmf"), "grid-", last_step, log, comm)?;
         Ok(Self { directory: directory.clone(), series })
     }
 

@@ -6,10 +6,11 @@
 //! | `domains.xdmf` | `domains.rs` |
 //! | `grid-*.h5`, `grid.xdmf` | `grid_file.rs` |
 //! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
-//! | XDMF time series | `xdmf.rs` |
+//! | XDMF time series | `xdmf.rs`, `growing_file.rs` |
 
 pub mod domains;
 pub mod grid_file;
+pub mod growing_file;
 pub mod hdf5_reader;
 pub mod hdf5_writer;
 pub mod point_field;

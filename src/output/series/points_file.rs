@@ -10,7 +10,11 @@ use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfS
 use crate::deck::model::Basis;
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
+use crate::output::terminal::log::Log;
 use crate::points::Points;
+
+/// Beginning of the frames' names.
+const FRAMES: &str = "points-";
 
 /// Fields that every file holds, asked for or not.
 const ALWAYS: [PointField; 3] = [PointField::Id, PointField::Body, PointField::Rank];
@@ -50,12 +54,15 @@ impl PointsSeries {
         basis: Basis,
         dimension: usize,
         last_step: usize,
+        log: &mut Log,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let mut this = Self::create(directory, fields, basis, dimension);
-        this.points = XdmfSeries::resume(&directory.file("points.xdmf"), last_step, comm)?;
+        this.points =
+            XdmfSeries::resume(&directory.file("points.xdmf"), FRAMES, last_step, log, comm)?;
         if let Some(series) = &mut this.domains {
-            *series = XdmfSeries::resume(&directory.file("domains.xdmf"), last_step, comm)?;
+            *series =
+                XdmfSeries::resume(&directory.file("domains.xdmf"), FRAMES, last_step, log, comm)?;
         }
         Ok(this)
     }
@@ -74,7 +81,7 @@ impl PointsSeries {
         points: &Points<D>,
         comm: &SimpleCommunicator,
     ) -> Result<()> {
-        let name = format!("points-{step:06}.h5");
+        let name = format!("{FRAMES}{step:06}.h5");
         let file = FileWriter::create(&self.directory.file(&name), comm)?;
         file.write_number("step", &(step as u64))?;
         file.write_number("time", &time)?;

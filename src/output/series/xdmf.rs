@@ -6,14 +6,18 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use mpi::topology::SimpleCommunicator;
 use quick_xml::escape::escape;
 
 use crate::error::{Error, Result};
 use crate::output::agreement::on_root;
-use crate::output::whole_file::{cannot_read, write_whole};
+use crate::output::names::{SERIES_HEAD, names_in, number_of};
+use crate::output::terminal::log::Log;
+use crate::output::whole_file::cannot_read;
+
+use super::growing_file::GrowingFile;
 
 /// Number type of a dataset.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -94,7 +98,7 @@ pub struct Snapshot {
 /// An XDMF file that grows by one snapshot at a time and is whole at any moment.
 #[derive(Debug)]
 pub struct XdmfSeries {
-    path: PathBuf,
+    file: GrowingFile,
     /// Step and XML of each snapshot; on rank 0 only.
     snapshots: Vec<(usize, String)>,
     /// The file holds later ones.
@@ -103,12 +107,23 @@ pub struct XdmfSeries {
 
 impl XdmfSeries {
     pub fn new(path: &Path) -> Self {
-        Self { path: path.to_path_buf(), snapshots: Vec::new(), longer: false }
+        Self {
+            file: GrowingFile::new(path, SERIES_HEAD, TAIL),
+            snapshots: Vec::new(),
+            longer: false,
+        }
     }
 
-    /// Continues the series of an earlier run, up to and including `last_step`. Nothing is written
-    /// before [`Self::cut`].
-    pub fn resume(path: &Path, last_step: usize, comm: &SimpleCommunicator) -> Result<Self> {
+    /// Continues the series of an earlier run, up to and including `last_step`. A file that is gone
+    /// is begun anew, which is said where frames (`frames` begins their names) were written before.
+    /// Nothing is written before [`Self::cut`].
+    pub fn resume(
+        path: &Path,
+        frames: &str,
+        last_step: usize,
+        log: &mut Log,
+        comm: &SimpleCommunicator,
+    ) -> Result<Self> {
         let mut series = Self::new(path);
         on_root(comm, || {
             if path.exists() {
@@ -117,6 +132,13 @@ impl XdmfSeries {
                 let before = all.len();
                 series.snapshots = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
                 series.longer = series.snapshots.len() < before;
+                series.file.assume(texts(&series.snapshots));
+            } else if has_frames(path, frames, last_step)? {
+                log.say(&format!(
+                    "warning: {} is not there: the series begins anew after step {last_step}, and \
+                     does not show the earlier frames",
+                    path.display()
+                ));
             }
             Ok(())
         })?;
@@ -127,37 +149,38 @@ impl XdmfSeries {
     pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
         on_root(comm, || {
             if self.longer {
-                write_whole(&self.path, series_xml(&self.snapshots).as_bytes())?;
+                self.file.replace(texts(&self.snapshots))?;
                 self.longer = false;
             }
             Ok(())
         })
     }
 
-    /// Adds a snapshot and rewrites the file.
+    /// Adds a snapshot.
     pub fn push(&mut self, snapshot: &Snapshot, comm: &SimpleCommunicator) -> Result<()> {
         on_root(comm, || {
             self.snapshots.push((snapshot.step, snapshot_xml(snapshot)));
-            write_whole(&self.path, series_xml(&self.snapshots).as_bytes())
+            self.file.push(texts(&self.snapshots))
         })
     }
+}
+
+/// True if a frame up to `last_step` lies beside the series.
+fn has_frames(path: &Path, begin: &str, last_step: usize) -> Result<bool> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    let names = names_in(folder)?;
+    Ok(names.iter().any(|name| number_of(name, begin).is_some_and(|n| n <= last_step)))
+}
+
+fn texts(snapshots: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
+    snapshots.iter().map(|(_, text)| text.as_str())
 }
 
 const GRID_START: &str = "      <Grid Name=\"step ";
 const GRID_END: &str = "      </Grid>\n";
 
-fn series_xml(snapshots: &[(usize, String)]) -> String {
-    let mut xml = String::from(
-        "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
-         <Xdmf Version=\"3.0\">\n  <Domain>\n    \
-         <Grid Name=\"series\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
-    );
-    for (_, snapshot) in snapshots {
-        xml.push_str(snapshot);
-    }
-    xml.push_str("    </Grid>\n  </Domain>\n</Xdmf>\n");
-    xml
-}
+/// How every series ends.
+const TAIL: &str = "    </Grid>\n  </Domain>\n</Xdmf>\n";
 
 fn snapshot_xml(snapshot: &Snapshot) -> String {
     let topology = snapshot.topology;
@@ -217,7 +240,7 @@ fn data_xml(data: &DataItem) -> String {
     )
 }
 
-/// Step and XML of every snapshot of a file that `series_xml` wrote.
+/// Step and XML of every snapshot of a file that [`XdmfSeries`] wrote.
 fn split_snapshots(text: &str) -> Option<Vec<(usize, String)>> {
     let mut snapshots = Vec::new();
     let mut rest = text;
@@ -267,6 +290,9 @@ mod tests {
     #[test]
     fn a_series_is_split_into_the_snapshots_it_was_made_of() {
         let parts: Vec<_> = [0, 5, 10].map(|s| (s, snapshot_xml(&snapshot(s)))).to_vec();
+        let series_xml = |parts: &[(usize, String)]| {
+            format!("{SERIES_HEAD}{}{TAIL}", texts(parts).collect::<String>())
+        };
         assert_eq!(split_snapshots(&series_xml(&parts)), Some(parts));
         assert_eq!(split_snapshots("<Xdmf/>"), None);
         assert_eq!(split_snapshots(&series_xml(&[])), Some(vec![]));

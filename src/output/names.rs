@@ -1,0 +1,109 @@
+//! The names of all files in a results directory.
+
+use std::fs;
+use std::path::Path;
+
+use super::whole_file::{PARTIAL, cannot_read};
+use crate::error::Result;
+
+/// Fixed names of a results directory.
+pub const SUMMARY: &str = "summary.json";
+pub const HISTORY: &str = "history.csv";
+pub const RESIDUALS: &str = "residuals.csv";
+pub const LOG: &str = "log.txt";
+pub const DECK: &str = "input.toml";
+pub const RESOLVED_DECK: &str = "resolved.toml";
+
+/// Ending of a checkpoint or frame that a restart from an earlier one has made void.
+pub const SUPERSEDED: &str = ".superseded";
+/// Ending of a checkpoint that `--restart last` could not take: not this run's to remove.
+pub const PASSED_OVER: &str = ".passed-over";
+
+/// How every series (`*.xdmf`) begins.
+pub const SERIES_HEAD: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
+     <Xdmf Version=\"3.0\">\n  <Domain>\n    \
+     <Grid Name=\"series\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
+
+/// All names that a run may leave, apart from the numbered ones.
+const NAMES: [&str; 9] = [
+    SUMMARY,
+    HISTORY,
+    RESIDUALS,
+    LOG,
+    DECK,
+    RESOLVED_DECK,
+    "points.xdmf",
+    "grid.xdmf",
+    "domains.xdmf",
+];
+/// `points-000005.h5` and its like.
+const NUMBERED: [&str; 3] = ["points-", "grid-", "checkpoint-"];
+/// Digits of a frame's and a checkpoint's number, at least.
+const DIGITS: usize = 6;
+
+/// Sorted names of files in `folder` that a run may write.
+pub fn names_in(folder: &Path) -> Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(|reason| cannot_read(folder, &reason))? {
+        let entry = entry.map_err(|reason| cannot_read(folder, &reason))?;
+        let is_file = entry.file_type().is_ok_and(|kind| !kind.is_dir());
+        if let (true, Ok(name)) = (is_file, entry.file_name().into_string())
+            && is_ours(&name)
+        {
+            names.push(name);
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+fn is_ours(name: &str) -> bool {
+    let name = without_ending(name);
+    NAMES.contains(&name) || NUMBERED.iter().any(|begin| number_of(name, begin).is_some())
+}
+
+/// Number of the finished file `begin`NNNNNN.h5; `None` for other names.
+pub fn number_of(name: &str, begin: &str) -> Option<usize> {
+    let number = name.strip_prefix(begin)?.strip_suffix(".h5")?.parse().ok()?;
+    (name == format!("{begin}{number:0DIGITS$}.h5")).then_some(number)
+}
+
+fn without_ending(name: &str) -> &str {
+    let endings = [PARTIAL, SUPERSEDED, PASSED_OVER];
+    // A series has two unfinished files at times.
+    let name = name.strip_suffix(PARTIAL).unwrap_or(name);
+    endings.iter().find_map(|ending| name.strip_suffix(ending)).unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn knows_the_names_of_a_run() {
+        for name in [
+            "summary.json",
+            "points-000005.h5",
+            "grid-000000.h5.partial",
+            "checkpoint-1000012.h5",
+            "checkpoint-000012.h5.superseded",
+            "points-000012.h5.superseded",
+            "checkpoint-000012.h5.passed-over",
+            "points.xdmf.partial",
+            "points.xdmf.partial.partial",
+        ] {
+            assert!(is_ours(name), "{name}");
+        }
+        for name in [
+            "points-.h5",
+            "points-5.h5",
+            "points-a.h5",
+            "my-points-000005.h5",
+            "notes.txt",
+            "grid.h5",
+            ".mpm-par.lock",
+        ] {
+            assert!(!is_ours(name), "{name}");
+        }
+    }
+}
