@@ -98,7 +98,7 @@ impl<const D: usize> Draft<D> {
 
     fn inverted(&self, cell: usize, corner: usize) -> Error {
         let at = self.node(self.nodes_of(cell)[corner] as usize);
-        let order = if D == 2 { "counter-clockwise" } else { "Gmsh's order" };
+        let order = if D == 2 { "order around it" } else { "Gmsh's order" };
         Error::Input(format!(
             "{}: {} is inverted or flat (negative Jacobian) at {at}; list its nodes in {order} and \
              keep all its angles below 180 degrees",

@@ -115,7 +115,7 @@ fn unknown_elements() {
 #[test]
 fn inverted_and_duplicate_cells() {
     let text = mesh(&SQUARE, 3, &[&[1, 2, 4, 3]]);
-    refused("turned.msh", &text, DECK, 2, &["turned.msh", "cell 2", "inverted", "node 1 at"]);
+    refused("turned.msh", &text, DECK, 2, &["turned.msh", "cell 2", "inverted", "node 4 at"]);
     let text = mesh(&SQUARE, 3, &[&[1, 2, 3, 4], &[2, 3, 4, 1]]);
     refused("twice.msh", &text, DECK, 2, &["twice.msh", "cell 3", "duplicate of cell 2"]);
 }
