@@ -212,3 +212,25 @@ fn standard_input_and_short_options() {
         assert!(output.status.success() && said.contains(part), "{word}: {said}");
     }
 }
+/// A block that its weight drives out of the grid: the message told to take smaller steps.
+#[test]
+fn a_side_that_nothing_holds_is_named() {
+    let text = deck(&rectangle("b", [1.0, 0.5], [2.0, 1.5])).replace("[\"x\", \"y\"]", "[\"x\"]");
+    let run = Run::text(&text)
+        .set("analysis={ type = \"explicit\", steps = 400, duration = 3.0 }")
+        .set("output.every=1000")
+        .set("method.mass=\"lumped\"");
+    for ranks in [1, 2] {
+        let outcome = run.clone().ranks(ranks).attempt();
+        assert_eq!(outcome.code, 1, "{}", outcome.stderr);
+        let said = format!("{}{}", outcome.stdout, outcome.said());
+        for part in [
+            "leaves the grid through its bottom side (y = 0 m), as no boundary holds that side",
+            "where = { side = \"bottom\" } and fix = [\"y\"] makes it a wall",
+            "body \"b\" can move along y freely under gravity",
+        ] {
+            assert!(said.contains(part), "no \"{part}\" in\n{said}");
+        }
+        assert!(!said.contains("smaller steps"), "{said}");
+    }
+}

@@ -175,7 +175,9 @@ fn refuse<const D: usize>(
     moved: &[f64],
 ) -> std::result::Result<(), Halt> {
     let (grid, method) = (&model.grid, &model.deck.method);
-    if let Some(refusal) = update::reason_to_refuse(world, grid, points, made) {
+    if let Some(refusal) =
+        update::reason_to_refuse(world, grid, &model.deck.boundaries, points, made)
+    {
         return Err(refusal.into());
     }
     // With the stress updated first the points have the step's deformation already.

@@ -140,7 +140,8 @@ pub fn carried<const D: usize>(
     };
     let after = moved_grid.as_ref().unwrap_or(grid);
     let basis = deck.method.basis;
-    let refused = update::reason_to_refuse(world, after, points, &made).map(|refusal| refusal.why);
+    let refused = update::reason_to_refuse(world, after, &deck.boundaries, points, &made)
+        .map(|refusal| refusal.why);
     let unsound = refused.or_else(|| {
         let grids = [grid, after];
         update::unsound_domain(world, grids, basis, numbering, displacement, points, &mut made)

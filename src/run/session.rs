@@ -34,6 +34,7 @@ use crate::record::checkpointing::{self, Checkpointer};
 use crate::record::clock::Clock;
 use crate::record::recorder::{Ending, Recorder, Resume};
 use crate::system::step_system;
+use crate::transfer::update;
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
@@ -207,13 +208,19 @@ impl Run<'_> {
             Error::Run(text) if resume.is_none() => Error::Input(format!("at the start {text}")),
             other => other,
         })?;
-        let warnings = match resume {
+        let mut warnings = match resume {
             None => formulas::check(world, &model, &points, &active.1)?,
             Some(_) => Vec::new(),
         };
-        if resume.is_none() && model.deck.analysis.kind == AnalysisType::QuasiStatic {
-            let first = quasi_static::first_span(&model.deck);
-            support::require(world, &model, &points, &active, first)?;
+        let first = quasi_static::first_span(&model.deck);
+        match model.deck.analysis.kind {
+            AnalysisType::QuasiStatic if resume.is_none() => {
+                support::require(world, &model, &points, &active, first)?;
+            }
+            AnalysisType::Explicit | AnalysisType::ImplicitDynamic if resume.is_none() => {
+                warnings.extend(support::falls(world, &model, &points, &active, first)?);
+            }
+            _ => {}
         }
         let plan = plan::of(world, &model, &points, &active);
         self.log.say(&report::plan(&plan));
@@ -322,7 +329,8 @@ impl Run<'_> {
             advice: match kind(String::new()).exit_code() {
                 _ if ending.on_request => Vec::new(),
                 3 => vec![checkpointing::advice(world, &recorder.directory())],
-                _ if !of_numerics => Vec::new(),
+                // What is missing there is said already, and no step is small enough.
+                _ if !of_numerics || ending.reason.contains(update::NOT_HELD) => Vec::new(),
                 _ => advice(&model.deck),
             },
             ..Failure::default()

@@ -7,7 +7,9 @@ use nalgebra::Matrix3;
 
 use crate::basis::domain::update_domains;
 use crate::basis::{cpdi1, cpdi2};
-use crate::deck::model::{Basis, DomainUpdate};
+use crate::deck::figure;
+use crate::deck::model::{Basis, Boundary, DomainUpdate, Place};
+use crate::deck::schema::{AXES, SIDES};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::material::{Material, local};
@@ -75,11 +77,15 @@ pub struct Refusal {
     pub inverted: bool,
 }
 
+/// How a refusal says that no boundary keeps points from leaving through a side.
+pub const NOT_HELD: &str = "no boundary holds that side";
+
 /// Says why the increments cannot be accepted, if so: a NaN, an inverted point, a point outside
-/// the grid (as it is after the step). Collective.
+/// the grid (as it is after the step), where it tells which of the `boundaries` holds there. Collective.
 pub fn reason_to_refuse<const D: usize>(
     world: &World,
     grid: &Grid<D>,
+    boundaries: &[Boundary],
     points: &Points<D>,
     increments: &Increments<D>,
 ) -> Option<Refusal> {
@@ -94,9 +100,45 @@ pub fn reason_to_refuse<const D: usize>(
         let fault = fault_of(&increments.deformation[p]);
         fault.or_else(|| {
             near.set(grid.locate_near(&moved, near.get()));
-            near.get().is_none().then(|| Fault::Leaves(format!("{moved:?}")))
+            let leaves =
+                || format!("{}: it would move to {moved:?} m", way_out(grid, boundaries, &moved));
+            near.get().is_none().then(|| Fault::Leaves(leaves()))
         })
     })
+}
+
+/// Through which side of the grid a place outside lies, and what is known of that side.
+fn way_out<const D: usize>(grid: &Grid<D>, boundaries: &[Boundary], place: &[f64; D]) -> String {
+    let (low, high) = grid.bounds();
+    let beyond = |axis: usize| (place[axis] - high[axis]).max(low[axis] - place[axis]);
+    let axis = (0..D).max_by(|&a, &b| beyond(a).total_cmp(&beyond(b))).unwrap_or(0);
+    if beyond(axis) <= 0.0 {
+        return "through its surface, between its outermost points".to_string();
+    }
+    let upper = place[axis] > high[axis];
+    let (side, name) = (SIDES[2 * axis + usize::from(upper)], AXES[axis]);
+    let end = if upper { high[axis] } else { low[axis] };
+    let holds = |boundary: &&Boundary| {
+        let there = match &boundary.place {
+            Place::Side { axis: a, upper: u } => (*a, *u) == (axis, upper),
+            Place::Box { min, max } => min[axis] <= end && end <= max[axis],
+            Place::Tag(_) => matches!(grid, Grid::Mesh(_)),
+            Place::CellsOf { .. } => false,
+        };
+        let moves = boundary.displacement.iter().any(|(component, _)| *component == axis);
+        there && (moves || boundary.fix.contains(&axis) || boundary.rotation.is_some())
+    };
+    let known = match boundaries.iter().find(holds) {
+        Some(boundary) => format!(
+            "though boundary \"{}\" prescribes {name} there: the step is too large, or unstable",
+            boundary.name
+        ),
+        None => format!(
+            "as {NOT_HELD}; a [[boundary]] with where = {{ side = \"{side}\" }} and fix = [\"{name}\"] \
+             makes it a wall, a larger grid gives room"
+        ),
+    };
+    format!("through its {side} side ({name} = {} m), {known}", figure(end))
 }
 
 /// [`reason_to_refuse`] of dF - 1 alone. Collective.
@@ -139,7 +181,7 @@ fn refused<const D: usize>(
             Fault::Inverted(determinant) => {
                 format!("is turned inside out (det dF = {determinant:.3e})")
             }
-            Fault::Leaves(place) => format!("leaves the grid: it would move to {place}"),
+            Fault::Leaves(way) => format!("leaves the grid {way}"),
         };
         format!("point {} at {:?} {what}", points.id[p], points.position[p])
     });

@@ -6,6 +6,8 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 
 use crate::basis;
+use crate::deck::model::Load;
+use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::ghost::FaceStencil;
 use crate::parallel::{World, exchange};
@@ -22,17 +24,62 @@ use crate::system::step_system::{self, Model};
 /// for rounding; a held line of a thousandth of the body's length leaves 1e-6.
 const FREE: f64 = 1e-12;
 
-/// An error that names the body and the motion, and a point where it is of a piece alone. Every
+/// An error where a rigid motion solves the first step's equations. Collective.
+pub fn require<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    active: &(Populated, Numbering),
+    first: StepSpan,
+) -> Result<()> {
+    match loose(world, model, points, active, first, None)? {
+        None => Ok(()),
+        Some((what, motion)) => Err(Error::Input(format!(
+            "{what} can {motion} freely: no boundary holds the nodes around it against this, so that \
+             the quasi-static system is singular; check the places and components of [[boundary]]"
+        ))),
+    }
+}
+
+/// In dynamics: a warning of a body that falls, as nothing holds it where gravity pulls. Collective.
+pub fn falls<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    active: &(Populated, Numbering),
+    first: StepSpan,
+) -> Result<Option<String>> {
+    let mut pulled = [false; D];
+    for load in &model.deck.loads {
+        if let Load::Gravity(gravity) = load {
+            pulled.iter_mut().zip(gravity).for_each(|(pulled, g)| *pulled |= *g != 0.0);
+        }
+    }
+    if !pulled.contains(&true) {
+        return Ok(None);
+    }
+    let loose = loose(world, model, points, active, first, Some(pulled))?;
+    Ok(loose.map(|(what, motion)| {
+        format!(
+            "{what} can {motion} freely under gravity: no boundary holds the nodes around it at the \
+             start; if it is not to fall, check the places and components of [[boundary]]"
+        )
+    }))
+}
+
+/// A piece of the material and a rigid motion that nothing resists, in words: any, or one of the
+/// `pulled` axes. The piece is a body, with a point where it is not the whole of it. Every
 /// held component of a node is a row of the rigid motions' values there; the motions that all rows
 /// of a piece annihilate are free. Each piece is judged by the rank that owns its first node. The
 /// cells and nodes are those of [`crate::system::step_system::active`]. Collective.
-pub fn require<const D: usize>(
+fn loose<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
     (populated, numbering): &(Populated, Numbering),
     first: StepSpan,
-) -> Result<()> {
+    pulled: Option<[bool; D]>,
+) -> Result<Option<(String, String)>> {
     let (deck, grid, partition) = (&model.deck, &model.grid, &model.partition);
     let faces = ties(world, model, populated)?;
     let with_ties;
@@ -71,6 +118,10 @@ pub fn require<const D: usize>(
         }
     }
     let free = of_all_ranks(world, model, grams)?.into_iter().find_map(|(piece, gram)| {
+        if let Some(pulled) = pulled {
+            let axis = (0..D).find(|&a| pulled[a] && gram[a * motions + a] == 0.0)?;
+            return Some((piece, along_axis(axis)));
+        }
         let spectrum = DMatrix::from_vec(motions, motions, gram).symmetric_eigen();
         let largest = spectrum.eigenvalues.max();
         let free = (0..motions).find(|&k| spectrum.eigenvalues[k] <= FREE * largest.max(1e-300))?;
@@ -78,12 +129,9 @@ pub fn require<const D: usize>(
     });
     let first = world.min_u64(free.as_ref().map_or(u64::MAX, |(piece, _)| *piece));
     let motion = free.filter(|(piece, _)| *piece == first).map(|(_, motion)| motion);
-    let Some(motion) = world.first_message(motion) else { return Ok(()) };
+    let Some(motion) = world.first_message(motion) else { return Ok(None) };
     let what = name_piece(world, model, points, numbering, &pieces, first)?;
-    Err(Error::Input(format!(
-        "{what} can {motion} freely: no boundary holds the nodes around it against this, so that \
-         the quasi-static system is singular; check the places and components of [[boundary]]"
-    )))
+    Ok(Some((what, motion)))
 }
 
 /// Ghost faces that hold cells together which share no node: only among simplices.
@@ -193,13 +241,16 @@ fn motions_at<const D: usize>(x: &[f64; D], component: usize) -> Vec<f64> {
     row
 }
 
+fn along_axis(axis: usize) -> String {
+    format!("move along {}", AXES[axis])
+}
+
 /// The motion in words.
 fn name(motion: impl Iterator<Item = f64>, dimension: usize) -> String {
     let size: Vec<f64> = motion.map(f64::abs).collect();
     let largest = (0..size.len()).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
-    const AXES: [&str; 3] = ["x", "y", "z"];
     if largest < dimension {
-        format!("move along {}", AXES[largest])
+        along_axis(largest)
     } else if dimension == 2 {
         "turn".into()
     } else {
