@@ -64,7 +64,7 @@ beam.toml:29:1: material.steel.density: unknown key \"density\"
     | ^^^^^^^
    = \"density\" belongs to [[body]]
    = known keys of [material.NAME]: model, young, poisson, yield, yield_stress, \
-shear_strength"
+shear_strength, friction, dilation, cohesion, tension, fit"
     );
 }
 
@@ -421,7 +421,7 @@ fn checks_of_bodies_and_shapes() {
                 ],
                 "expected only one of \"yield\", \"shear_strength\"",
             ),
-            (&["material.steel.shear_strength=1"], "only for model = \"von-mises\""),
+            (&["material.steel.shear_strength=1"], "only for model = \"von-mises\", \"tresca\""),
             (&["material.steel.poisson=-1"], "expected a number > -1 and < 0.5"),
             (&["material=7"], "material: expected tables, each under a name of its own, found 7"),
             (&["body.0.material=stel"], "expected \"steel\", found \"stel\""),
