@@ -8,7 +8,7 @@ use std::path::Path;
 use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
-use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use mpm_par::analysis::solver;
 use mpm_par::deck;
 use mpm_par::deck::model::Frame;
@@ -19,9 +19,10 @@ use mpm_par::petsc::snes::NewtonProblem;
 use mpm_par::points::Points;
 use mpm_par::run::setup;
 use mpm_par::system::conditions::{Conditions, StepSpan};
+use mpm_par::system::model::Model;
 use mpm_par::system::plain;
 use mpm_par::system::scatter::{self, BlockMatrix};
-use mpm_par::system::step_system::{Discretisation, Model};
+use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::linear::ghost_matrix;
 use mpm_par::system::terms::stress;
 
@@ -214,8 +215,13 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
     };
     let external = vec![0.0; owned];
     let grid = &model.grid;
-    let mut problem =
-        Equilibrium::new(world, grid, &mesh, step, &conditions, &left_out, external, settings)?;
+    let equations = StepEquations {
+        conditions: &conditions,
+        left_out: &left_out,
+        external_owned: external,
+        inertia: None,
+    };
+    let mut problem = Equilibrium::new(world, grid, &mesh, step, equations, settings)?;
     let mut matrix = solver::matrix(world, &model, numbering, pattern)?;
     let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);
     x.values_mut()?.copy_from_slice(&probe[..owned]);

@@ -17,40 +17,36 @@ use crate::system::scatter::{self, BlockMatrix};
 use crate::system::terms::stress;
 
 use super::extremes::{Extremes, Reduced};
-use super::load_steps::Moment;
-use crate::parallel::balance;
 use crate::record::clock::Clock;
+use crate::record::context::Run;
 use crate::record::reactions::reactions;
-use crate::record::recorder::{Ending, Recorder};
-use crate::system::step_system::{Coupling, Discretisation, Model};
+use crate::record::recorder::Ending;
+use crate::record::step::{Moment, grid_side};
+use crate::system::model::Model;
+use crate::system::step_system::{Coupling, Discretisation};
 use crate::system::terms::linear::ghost_matrix;
 use crate::transfer::mapping;
 
 /// Moves the bodies in equal increments and records one row for each position.
-pub fn run<const D: usize>(
-    world: &World,
-    model: &mut Model<D>,
-    points: &mut Points<D>,
-    recorder: &mut Recorder,
-    clock: &mut Clock,
-) -> Result<Ending> {
+pub fn run<const D: usize>(run: &mut Run<D>) -> Result<Ending> {
+    let model = &run.model;
     let steps = model.deck.analysis.steps.unwrap_or(1);
     let total = model.deck.conditioning_displacement.clone().unwrap_or_else(|| vec![0.0; D]);
-    let done = match recorder.resumed() {
+    let done = match run.recorder.resumed() {
         Some(state) => state.count("conditioning.done")? as usize,
         None => {
-            recorder.frame(world, 0, 0.0, points)?;
+            run.frame(0, 0.0)?;
             0
         }
     };
     for number in done + 1..=steps {
-        for x in &mut points.position {
+        for x in &mut run.points.position {
             for (x, total) in x.iter_mut().zip(&total) {
                 *x += total / steps as f64;
             }
         }
-        let busy = clock.busy();
-        clock.time(Phase::Migrate, || balance::settle(world, model, points, busy))?;
+        run.settle()?;
+        let Run { world, model, points, recorder, clock } = &mut *run;
         let span = StepSpan {
             factor_start: (number - 1) as f64 / steps as f64,
             factor_end: number as f64 / steps as f64,
@@ -108,7 +104,7 @@ fn study<const D: usize>(
             &none,
         ),
         conditioning: numbers,
-        ..mesh.row(world, points)
+        ..grid_side(world, &mesh, points)
     })
 }
 

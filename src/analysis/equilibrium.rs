@@ -42,6 +42,16 @@ pub struct NewtonSettings {
     pub symmetric: bool,
 }
 
+/// What a step's equations consist of beside the stress of its points.
+pub struct StepEquations<'a> {
+    pub conditions: &'a Conditions,
+    /// Local nodes that carry no equation of their own (`drop_below`).
+    pub left_out: &'a [bool],
+    /// Right-hand side of the owned degrees of freedom, N.
+    pub external_owned: Vec<f64>,
+    pub inertia: Option<Inertia>,
+}
+
 /// One step's equations. Vectors named `*_owned` hold the owned degrees of freedom, the others
 /// the local ones (owned, then ghosts).
 pub struct Equilibrium<'a, const D: usize> {
@@ -103,11 +113,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         grid: &'a Grid<D>,
         mesh: &'a Discretisation<D>,
         step: StepPoints<'a, D>,
-        conditions: &Conditions,
-        left_out: &[bool],
-        external_owned: Vec<f64>,
+        equations: StepEquations<'_>,
         settings: NewtonSettings,
     ) -> Result<Self> {
+        let StepEquations { conditions, left_out, external_owned, inertia } = equations;
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let mut held = conditions.fixed.clone();
         let increment = conditions.increment.clone();
@@ -132,7 +141,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             increment,
             external_owned,
             ghost,
-            inertia: None,
+            inertia,
             layout,
             beside,
             tangent: Tangent::Stale,
@@ -151,12 +160,6 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             at_round_off: false,
             health: Health::default(),
         })
-    }
-
-    /// The same equations of a body that has mass.
-    pub fn with_inertia(mut self, inertia: Inertia) -> Self {
-        self.inertia = Some(inertia);
-        self
     }
 
     /// Acts on the matrix as multigrid reads it.

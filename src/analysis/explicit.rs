@@ -1,134 +1,122 @@
 //! Explicit dynamics over all time steps (Ghost §2.3): what a run checks, records and leaves.
 
 use crate::deck::model::{Basis, DomainUpdate, Mass};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::output::restart::run_state::RunState;
-use crate::parallel::World;
 use crate::points::Points;
-
-use super::explicit_nodes::Halt;
-use super::explicit_step::advance;
-use super::load_steps::Moment;
-use super::step_end::{self, End};
-use super::time_steps::{TimeSteps, stability_limit};
-use crate::record::clock::Clock;
-use crate::record::ledger::{Entry, Ledger, StepSums};
-use crate::record::recorder::{Ending, Recorder};
-use crate::system::step_system::Model;
+use crate::record::context::Run;
+use crate::record::ledger::{Entry, Ledger};
+use crate::record::step::{Moment, Solved};
+use crate::system::model::Model;
+use crate::transfer::refusal::{Cause, Halt};
 use crate::transfer::undo::Snapshot;
-use crate::transfer::update;
 
-/// Runs all time steps and writes everything a run leaves.
-pub fn run<const D: usize>(
-    world: &World,
-    model: &mut Model<D>,
-    points: &mut Points<D>,
-    recorder: &mut Recorder,
-    clock: &mut Clock,
-) -> Result<Ending> {
-    let kind = model.deck.method.mass;
-    let limit_now = |model: &Model<D>, points: &Points<D>| {
-        stability_limit(world, &model.grid, &model.materials, kind, points)
-    };
-    let mut steps = TimeSteps::new(&model.deck.analysis);
-    let (mut limit, wave_energy) = limit_now(model, points);
-    let start =
-        StepSums { energies: update::energies(points, &model.materials), ..StepSums::default() };
-    let mut ledger = Ledger::new(&Entry::unite(world, points, start), wave_energy);
-    let mut framed = match recorder.resumed() {
-        Some(state) => {
-            steps.restore(state)?;
-            ledger.restore(state)?;
-            None
-        }
-        None => {
-            recorder.frame(world, 0, 0.0, points)?;
-            Some(0)
-        }
-    };
-    let state_of = |steps: &TimeSteps, ledger: &Ledger| {
+use super::explicit_step::advance;
+use super::time_loop::{Analysis, Answer, Manner, Next};
+use super::time_steps::{TimeSteps, ledger_at_start, stability_limit};
+
+/// The explicit analysis between its steps.
+pub struct Explicit<const D: usize> {
+    steps: TimeSteps,
+    /// Stability limit of full cells, s.
+    limit: f64,
+    ledger: Ledger,
+    before: Snapshot<D>,
+}
+
+impl<const D: usize> Explicit<D> {
+    /// Before the first step. Collective.
+    pub fn new(run: &Run<D>) -> Self {
+        let (ledger, limit) = ledger_at_start(run);
+        let steps = TimeSteps::new(&run.model.deck.analysis);
+        Explicit { steps, limit, ledger, before: Snapshot::default() }
+    }
+}
+
+impl<const D: usize> Analysis<D> for Explicit<D> {
+    fn manner(&self) -> Manner {
+        Manner { newton: false, time: true, steps: None }
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.steps.restore(state)?;
+        self.ledger.restore(state)
+    }
+
+    fn state(&self) -> RunState {
         let mut state = RunState::new();
-        steps.save(&mut state);
-        ledger.save(&mut state);
+        self.steps.save(&mut state);
+        self.ledger.save(&mut state);
         state
-    };
-    let mut before = Snapshot::default();
-    while let Some(span) = steps.next(limit) {
-        let number = steps.number();
-        let at = |why: &str| format!("step {number} (to t = {:.6e} s): {why}", span.time_end);
-        let (mut solved, sums) = match advance(world, model, points, &mut before, clock, span) {
-            Ok(done) => done,
-            Err(Halt::Failed(error)) if !matches!(error, Error::Run(_) | Error::Input(_)) => {
-                return Err(error);
-            }
-            Err(halt) => {
-                let of_deck = matches!(halt, Halt::Failed(Error::Input(_)));
-                let (why, inverted) = match halt {
-                    Halt::Refused(refusal) => (refusal.why, refusal.inverted),
-                    Halt::Failed(error) => (error.to_string(), false),
-                };
-                let culprit = world.first_message(update::not_finite(points));
-                let detail = culprit.map_or(String::new(), |text| format!(": {text}"));
-                before.restore(points);
-                let (time, state) = (span.time_start, state_of(&steps, &ledger));
-                step_end::leave(world, model, points, recorder, framed, number - 1, time, state)?;
-                let hint = if inverted { unstabilised(model) } else { "" };
-                let text = at(&format!("{why}{detail}{hint}"));
-                return if of_deck { Err(Error::Input(text)) } else { Ok(Ending::failed(text)) };
-            }
-        };
-        let entry = Entry::unite(world, points, sums);
+    }
+
+    fn next(&self) -> Option<Next> {
+        let number = self.steps.number();
+        self.steps.next(self.limit).map(|span| Next { span, number })
+    }
+
+    fn step(&mut self, run: &mut Run<D>, next: Next) -> std::result::Result<Solved<D>, Halt> {
+        let (mut solved, sums) = advance(run, &mut self.before, next.span)?;
+        let entry = Entry::unite(run.world, &run.points, sums);
         let row = &mut solved.row;
-        row.step = number;
-        if let Err(why) = ledger.book(&entry, row) {
+        row.step = next.number;
+        if let Err(gain) = self.ledger.book(&entry, row) {
             // The row shows what happened.
-            row.wall_seconds = clock.elapsed();
-            recorder.step(world, row, false, Moment::End)?;
-            let (limit, _) = limit_now(model, points);
-            before.restore(points);
-            let (time, state) = (span.time_start, state_of(&steps, &ledger));
-            step_end::leave(world, model, points, recorder, framed, number - 1, time, state)?;
-            return Ok(Ending::failed(at(&format!(
-                "{why}; the time step {:.3e} s is too large (stability limit of full cells \
-                 {limit:.3e} s){}",
+            row.wall_seconds = run.clock.elapsed();
+            run.recorder.step(run.world, row, false, Moment::End)?;
+            let (limit, _) = stability_limit(run.world, &run.model, &run.points);
+            let remedy = format!(
+                "the time step {:.3e} s is too large (stability limit of full cells {limit:.3e} \
+                 s){}",
                 row.dt,
-                unstabilised(model)
-            ))));
+                unstabilised(&run.model)
+            );
+            return Err(Halt::Unstable { gain, remedy });
         }
         if entry.overgrown > 0.0 {
-            recorder.log.warn_of_step(
-                number,
+            run.recorder.log.warn_of_step(
+                next.number,
                 "GIMP domains had grown to more than twice what their points are stretched by, and \
                  were put back to the stretch: method.domain_update = \"corners\" follows nodes that \
                  hardly hold mass; \"stretch\" or a consistent mass does not",
                 &format!("({} domains)", entry.overgrown),
             );
         }
-        if let Some(share) = ledger.gain(&entry) {
-            recorder.log.warn_of_step(
-                number,
-                &gaining(model),
-                &format!("({:.1} %)", 100.0 * share),
-            );
+        if let Some(share) = self.ledger.gain(&entry) {
+            let detail = format!("({:.1} %)", 100.0 * share);
+            run.recorder.log.warn_of_step(next.number, &gaining(&run.model), &detail);
         }
-        steps.accept(span);
-        recorder.steps_completed = number;
-        recorder.linear.add(row.linear_iterations);
-        if steps.follows_limit() {
-            limit = limit_now(model, points).0;
-        }
-        let moment = if steps.next(limit).is_none() { Moment::End } else { Moment::Step };
-        let end = End { number, label: span.time_end, moment, newton: false };
-        let state = state_of(&steps, &ledger);
-        let finished = step_end::finish(world, model, points, recorder, clock, solved, end, state)?;
-        if finished.framed {
-            framed = Some(number);
-        }
-        if let Some(ending) = finished.stop {
-            return Ok(ending);
+        run.recorder.linear.add(row.linear_iterations);
+        Ok(solved)
+    }
+
+    fn undo(&mut self, points: &mut Points<D>) -> bool {
+        self.before.restore(points);
+        true
+    }
+
+    fn refuse(&mut self) -> Answer {
+        Answer::Uncut
+    }
+
+    fn hint(&self, model: &Model<D>, halt: &Halt) -> &'static str {
+        match halt {
+            Halt::Refused(refusal) if refusal.cause == Cause::Inverted => unstabilised(model),
+            _ => "",
         }
     }
-    Ok(Ending::completed())
+
+    fn accept(&mut self, run: &Run<D>, next: Next) -> Moment {
+        self.steps.accept(next.span);
+        if self.steps.follows_limit() {
+            self.limit = stability_limit(run.world, &run.model, &run.points).0;
+        }
+        if self.steps.next(self.limit).is_none() { Moment::End } else { Moment::Step }
+    }
+
+    fn completed(&self) -> usize {
+        self.steps.number() - 1
+    }
 }
 
 /// Where energy that no work brought in may come from.

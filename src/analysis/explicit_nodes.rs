@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use crate::deck::model::StressUpdate;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
@@ -15,31 +15,14 @@ use crate::tensor::Square;
 use crate::mass::grid_mass::{GridMass, Inverse, require_mass};
 use crate::mass::light_nodes::LightNodes;
 use crate::record::clock::Clock;
-use crate::system::step_system::{Discretisation, Model};
+use crate::system::model::Model;
+use crate::system::step_system::Discretisation;
 use crate::transfer::mapping::{self, Pushed};
 use crate::transfer::nodal_sums::{over_points, to_points};
+use crate::transfer::refusal::Halt;
 use crate::transfer::transport::Carrier;
 use crate::transfer::undo::Snapshot;
-use crate::transfer::update::{self, PointEnergies, Refusal};
-
-/// Why a step has no end.
-pub(crate) enum Halt {
-    /// Its increments cannot be applied.
-    Refused(Refusal),
-    Failed(Error),
-}
-
-impl From<Error> for Halt {
-    fn from(error: Error) -> Self {
-        Halt::Failed(error)
-    }
-}
-
-impl From<Refusal> for Halt {
-    fn from(refusal: Refusal) -> Self {
-        Halt::Refused(refusal)
-    }
-}
+use crate::transfer::update::{self, PointEnergies};
 
 /// A step's equations at the nodes.
 pub(crate) struct Nodes<'a, const D: usize> {
@@ -222,9 +205,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         };
         deforming.iter_mut().for_each(|v| *v *= self.dt);
         let deformation = mapping::displacement_gradients(step, &deforming);
-        if let Some(refusal) = update::deformation_to_refuse(self.world, points, &deformation) {
-            return Err(refusal.into());
-        }
+        update::require_sound_deformation(self.world, points, &deformation)?;
         let energies = update::deform(&self.model.materials, &deformation, points, Some(before));
         Ok((deformation, energies))
     }

@@ -3,7 +3,6 @@
 //! first, last, or last with the velocity mapped once more.
 
 use crate::deck::model::{Basis, Mass, StressUpdate};
-use crate::error::Error;
 use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
@@ -12,15 +11,17 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 
-use super::explicit_nodes::{Forces, Halt, Motion, Nodes};
-use super::step_end::Solved;
+use super::explicit_nodes::{Forces, Motion, Nodes};
 use crate::mass::grid_mass::GridMass;
 use crate::mass::light_nodes::LightNodes;
-use crate::record::clock::Clock;
+use crate::record::context::Run;
 use crate::record::ledger::StepSums;
 use crate::record::reactions::{at_held, reactions};
-use crate::system::step_system::{Coupling, Discretisation, Model};
+use crate::record::step::{Solved, grid_side};
+use crate::system::model::Model;
+use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::mapping::{self, Pushed};
+use crate::transfer::refusal::Halt;
 use crate::transfer::transport::{self, Carrier};
 use crate::transfer::undo::Snapshot;
 use crate::transfer::update::{self, Increments};
@@ -28,13 +29,11 @@ use crate::transfer::update::{self, Increments};
 /// One time step; the points end at their new state, not yet migrated, and `before` holds what was
 /// overwritten so far, after a failure too. The row lacks the ledger's columns. Collective.
 pub(crate) fn advance<const D: usize>(
-    world: &World,
-    model: &Model<D>,
-    points: &mut Points<D>,
+    run: &mut Run<D>,
     before: &mut Snapshot<D>,
-    clock: &mut Clock,
     span: StepSpan,
 ) -> std::result::Result<(Solved<D>, StepSums), Halt> {
+    let Run { world, model, points, clock, .. } = run;
     before.begin();
     let (deck, grid) = (&model.deck, &model.grid);
     let (method, dt) = (&deck.method, span.time_end - span.time_start);
@@ -101,16 +100,8 @@ pub(crate) fn advance<const D: usize>(
         if !usf {
             update::stretch(&made.deformation, points, Some(before));
         }
-        let followed = update::follow(
-            grid,
-            method.basis,
-            method.domain_update,
-            &mesh.numbering,
-            &moved,
-            &made,
-            points,
-            Some(before),
-        );
+        let numbering = &mesh.numbering;
+        let followed = update::follow(model, numbering, &moved, &made, points, Some(before));
         let overgrown = world.fail_together(followed)?;
         let energies = energies.unwrap_or_else(|| {
             update::respond(&model.materials, &made.deformation, points, Some(before))
@@ -128,7 +119,7 @@ pub(crate) fn advance<const D: usize>(
         dt,
         linear_iterations,
         reactions: reactions(world, grid, &mesh, points, &deck.boundaries, &conditions, &residual),
-        ..mesh.row(world, points)
+        ..grid_side(world, &mesh, points)
     };
     let driven = mass.driven_energy(&mesh, &conditions.increment, dt);
     let sums = StepSums { energies, ghost, work, driven, overgrown };
@@ -175,11 +166,7 @@ fn refuse<const D: usize>(
     moved: &[f64],
 ) -> std::result::Result<(), Halt> {
     let (grid, method) = (&model.grid, &model.deck.method);
-    if let Some(refusal) =
-        update::reason_to_refuse(world, grid, &model.deck.boundaries, points, made)
-    {
-        return Err(refusal.into());
-    }
+    update::require_sound(world, grid, &model.deck.boundaries, points, made)?;
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
     let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
@@ -189,10 +176,9 @@ fn refuse<const D: usize>(
     });
     let made = still.as_mut().unwrap_or(made);
     let numbering = &mesh.numbering;
-    match update::unsound_domain(world, [grid; 2], method.basis, numbering, moved, points, made) {
-        Some(why) => Err(Error::Run(why).into()),
-        None => Ok(()),
-    }
+    let grids = [grid; 2];
+    update::require_sound_domains(world, grids, method.basis, numbering, moved, points, made)?;
+    Ok(())
 }
 
 /// M a - f over the owned degrees of freedom: what boundaries supply where they hold.

@@ -3,17 +3,8 @@
 use crate::deck::model::OnFailure;
 use crate::error::{Error, Result};
 use crate::output::restart::run_state::RunState;
+use crate::record::step::Moment;
 use crate::system::conditions::StepSpan;
-
-/// Where a time loop stands after a step.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Moment {
-    /// Inside a nominal step that was cut.
-    PartOfStep,
-    Step,
-    /// Nothing is left to do.
-    End,
-}
 
 /// The position in the analysis, counted in ticks so that halving and doubling are exact.
 #[derive(Debug, Clone)]

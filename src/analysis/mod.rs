@@ -2,16 +2,17 @@
 //!
 //! | deck value or step | file | source |
 //! |---|---|---|
-//! | `quasi-static` | `quasi_static.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
+//! | the time loop | `time_loop.rs` | |
+//! | `quasi-static` | `implicit.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
 //! | `explicit` | `explicit.rs`, `explicit_step.rs`, `explicit_nodes.rs` | Ghost §2.3, 3.5 |
-//! | `implicit-dynamic` | `implicit_dynamic.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
+//! | `implicit-dynamic` | `implicit.rs`, `inertial.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
 //! | load steps, cut and grown again | `load_steps.rs` | |
 //! | time steps and their stability limit | `time_steps.rs` | Ghost §3.5 |
 //! | Newton's method for a step | `newton.rs`, `convergence.rs` | Lagrangian eq. 26-30, 40 |
 //! | the equations that it solves | `equilibrium.rs` | Lagrangian eq. 26-30 |
 //! | default linear solvers | `solver.rs` | |
-//! | what every accepted step ends with | `step_end.rs` | |
+//! | a step that ends a run, in words | `failure.rs` | |
 
 pub mod conditioning;
 pub mod convergence;
@@ -20,12 +21,13 @@ pub mod explicit;
 pub mod explicit_nodes;
 pub mod explicit_step;
 pub mod extremes;
-pub mod implicit_dynamic;
+pub mod failure;
+pub mod implicit;
+mod inertial;
 pub mod load_steps;
 pub mod newmark;
 pub mod newton;
-pub mod quasi_static;
 pub mod round_off;
 pub mod solver;
-pub mod step_end;
+pub mod time_loop;
 pub mod time_steps;

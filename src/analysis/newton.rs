@@ -11,12 +11,13 @@ use crate::petsc::{Matrix, Vector};
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
 
-use super::equilibrium::{Equilibrium, NewtonSettings};
+use super::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use super::solver::{self, Linear, Trials};
-use crate::record::clock::Clock;
-use crate::record::recorder::Recorder;
-use crate::system::step_system::{Discretisation, Model};
+use crate::record::context::Run;
+use crate::system::model::Model;
+use crate::system::step_system::Discretisation;
 use crate::transfer::mesh_motion;
+use crate::transfer::refusal::{Cause, Halt, Refusal};
 use crate::transfer::update::{self, Increments};
 
 /// A converged step. Vectors without other mention hold the owned degrees of freedom.
@@ -47,37 +48,33 @@ pub fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
     }
 }
 
-/// Solves `problem` and reports the iterations of step `number`. The inner `Err` says why it
-/// could not be solved. Collective.
-#[allow(clippy::too_many_arguments)]
+/// Solves the equations of step `number` and reports the iterations. Collective.
 pub fn solve<const D: usize>(
-    world: &World,
-    model: &Model<D>,
+    run: &mut Run<D>,
     mesh: &Discretisation<D>,
-    points: &Points<D>,
-    mut problem: Equilibrium<'_, D>,
-    recorder: &mut Recorder,
-    clock: &mut Clock,
+    equations: StepEquations<'_>,
     trials: &mut Trials,
     number: usize,
-) -> Result<std::result::Result<Converged, String>> {
+) -> std::result::Result<Converged, Halt> {
+    let Run { world, model, points, recorder, clock } = run;
     let numbering = &mesh.numbering;
+    let step = mesh.step_points(points, &model.materials);
+    let mut problem = clock.time(Phase::Assemble, || {
+        Equilibrium::new(world, &model.grid, mesh, step, equations, settings(model))
+    })?;
     let mut matrix =
         clock.time(Phase::Assemble, || solver::matrix(world, model, numbering, &mesh.pattern))?;
     let mut solution = matrix.vector()?;
     let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
     let stabilised = model.stabilised();
-    let (outcome, used) = solve_robustly(
-        world,
-        &mut problem,
+    let size = Size {
+        equations: numbering.total * D,
         stabilised,
         // Domains leave cells with more nodes than the corners in them tell apart.
-        !stabilised && matches!(model.deck.method.basis, Basis::Cpdi1 | Basis::Cpdi2),
-        numbering.total * D,
-        trials,
-        &mut matrix,
-        &mut solution,
-    )?;
+        null_pivots: !stabilised && matches!(model.deck.method.basis, Basis::Cpdi1 | Basis::Cpdi2),
+    };
+    let (outcome, used) =
+        solve_robustly(world, &mut problem, size, trials, &mut matrix, &mut solution)?;
     if let Some(solver) = used {
         recorder.log.say(&format!("step {number}: multigrid failed; solved again with {solver}"));
     }
@@ -91,7 +88,8 @@ pub fn solve<const D: usize>(
     if !outcome.converged {
         let point = problem.refused_point(points);
         let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
-        return Ok(Err(format!("Newton's method failed ({}){detail}", outcome.reason)));
+        let what = format!("Newton's method failed ({}){detail}", outcome.reason);
+        return Err(Refusal { cause: Cause::NotConverged, what }.into());
     }
     let residual = problem.errors.last().copied().unwrap_or(0.0);
     if problem.at_round_off {
@@ -100,7 +98,7 @@ pub fn solve<const D: usize>(
     }
     recorder.newton.add(problem.errors.len());
     recorder.linear.add(outcome.linear_iterations_total);
-    Ok(Ok(Converged {
+    Ok(Converged {
         displacement: problem.displacement().to_vec(),
         internal: problem.internal_force().to_vec(),
         internal_start: problem.internal_force_at_start().to_vec(),
@@ -108,7 +106,7 @@ pub fn solve<const D: usize>(
         residual,
         evaluations: problem.errors.len(),
         linear_iterations: outcome.linear_iterations_total,
-    }))
+    })
 }
 
 const AT_ROUND_OFF: &str = "the residual is above analysis.tolerance and all of it round-off: it is at \
@@ -121,9 +119,8 @@ pub struct Carried<const D: usize> {
     pub moved_grid: Option<Grid<D>>,
 }
 
-/// What the step's nodal `displacement` (local nodes, m) makes of points and grid. The inner `Err`
-/// says why it cannot be applied, the same on every rank: a cell that would turn over, an unsound
-/// point, an unsound domain. Collective.
+/// What the step's nodal `displacement` (local nodes, m) makes of points and grid. Refused, on every
+/// rank alike: a cell that would turn over, an unsound point, an unsound domain. Collective.
 pub fn carried<const D: usize>(
     world: &World,
     model: &Model<D>,
@@ -131,40 +128,39 @@ pub fn carried<const D: usize>(
     points: &Points<D>,
     displacement: &[f64],
     span: StepSpan,
-) -> Result<std::result::Result<Carried<D>, String>> {
+) -> std::result::Result<Carried<D>, Halt> {
     let (deck, grid, numbering) = (&model.deck, &model.grid, &mesh.numbering);
     let mut made = update::increments(mesh.step_points(points, &model.materials), displacement);
-    let moved_grid = match mesh_motion::moved(world, deck, grid, numbering, displacement, span)? {
-        Ok(moved_grid) => moved_grid,
-        Err(why) => return Ok(Err(why)),
-    };
+    let moved_grid = mesh_motion::moved(world, deck, grid, numbering, displacement, span)?;
     let after = moved_grid.as_ref().unwrap_or(grid);
     let basis = deck.method.basis;
-    let refused = update::reason_to_refuse(world, after, &deck.boundaries, points, &made)
-        .map(|refusal| refusal.why);
-    let unsound = refused.or_else(|| {
-        let grids = [grid, after];
-        update::unsound_domain(world, grids, basis, numbering, displacement, points, &mut made)
-    });
-    Ok(match unsound {
-        Some(why) => Err(why),
-        None => Ok(Carried { made, moved_grid }),
-    })
+    update::require_sound(world, after, &deck.boundaries, points, &made)?;
+    let grids = [grid, after];
+    update::require_sound_domains(world, grids, basis, numbering, displacement, points, &mut made)?;
+    Ok(Carried { made, moved_grid })
+}
+
+/// What the choice of a linear solver reads.
+#[derive(Clone, Copy)]
+struct Size {
+    /// Over all ranks.
+    equations: usize,
+    stabilised: bool,
+    /// The factors may meet pivots that vanish.
+    null_pivots: bool,
 }
 
 /// Newton's method with the default solver; where that fails, once more from the start with the
 /// next stronger one, which is named. Collective.
-#[allow(clippy::too_many_arguments)]
 fn solve_robustly<const D: usize>(
     world: &World,
     problem: &mut Equilibrium<'_, D>,
-    stabilised: bool,
-    null_pivots: bool,
-    equations: usize,
+    size: Size,
     trials: &mut Trials,
     matrix: &mut Matrix,
     solution: &mut Vector,
 ) -> Result<(NewtonOutcome, Option<String>)> {
+    let Size { equations, stabilised, null_pivots } = size;
     let linear = Linear::of::<D>(equations, stabilised, trials)?;
     let (most, symmetric) = (problem.settings().max_evaluations, problem.settings().symmetric);
     let mut snes = solver::newton(world, linear, symmetric, null_pivots, most)?;

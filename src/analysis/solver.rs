@@ -19,7 +19,7 @@ use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 
 use super::extremes;
-use crate::system::step_system::Model;
+use crate::system::model::Model;
 
 /// Equations up to which the direct solver is the default in 2D and 3D: multigrid is faster from
 /// about a thousand on, but small studies like their residuals exact.

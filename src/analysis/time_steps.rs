@@ -9,12 +9,15 @@
 
 use crate::deck::model::{Analysis, Mass};
 use crate::error::Result;
-use crate::grid::Grid;
-use crate::material::{Material, local};
+use crate::material::local;
 use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::points::Points;
+use crate::record::context::Run;
+use crate::record::ledger::{Entry, Ledger, StepSums};
 use crate::system::conditions::StepSpan;
+use crate::system::model::Model;
+use crate::transfer::update;
 
 /// Where a run stands in time.
 #[derive(Debug, Clone)]
@@ -94,22 +97,30 @@ impl TimeSteps {
     }
 }
 
+/// The ledger of a dynamic run before its first step, and the stability limit there, s. Collective.
+pub(super) fn ledger_at_start<const D: usize>(run: &Run<D>) -> (Ledger, f64) {
+    let Run { world, model, points, .. } = run;
+    let (limit, wave_energy) = stability_limit(world, model, points);
+    let energies = update::energies(points, &model.materials);
+    let start = StepSums { energies, ..StepSums::default() };
+    (Ledger::new(&Entry::unite(world, points, start), wave_energy), limit)
+}
+
 /// The stability limit, s, and Σ m c^2, J. Collective.
 pub fn stability_limit<const D: usize>(
     world: &World,
-    grid: &Grid<D>,
-    materials: &[Material],
-    mass: Mass,
+    model: &Model<D>,
     points: &Points<D>,
 ) -> (f64, f64) {
-    let h = grid.cell_size();
-    let factor = match mass {
+    let h = model.grid.cell_size();
+    let factor = match model.deck.method.mass {
         Mass::Consistent => (3.0 * D as f64).sqrt(),
         Mass::Lumped => 1.0,
     };
     let (mut rate, mut wave_energy) = (0.0f64, 0.0);
     for p in 0..points.len() {
-        let modulus = local(materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
+        let modulus =
+            local(&model.materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
         let wave = modulus * points.volume(p) / points.mass[p];
         let speed = points.velocity[p].iter().map(|v| v * v).sum::<f64>().sqrt();
         rate = rate.max(wave.abs().sqrt() * factor + speed);

@@ -9,6 +9,9 @@ use super::agreement::on_root;
 use super::directory::{ResultsDirectory, SUMMARY};
 use super::whole_file::write_whole;
 use crate::error::{Error, Result};
+use crate::parallel::World;
+use crate::parallel::balance::BalanceReport;
+use crate::parallel::traffic::Traffic;
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -63,17 +66,6 @@ impl Count {
     }
 }
 
-/// What kept the ranks equally loaded.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct BalanceReport {
-    /// New partitions taken.
-    pub rebalanced: usize,
-    /// Share of the points that changed rank for them, summed over all of them.
-    pub moved_share: f64,
-    /// Largest imbalance of the run.
-    pub largest_imbalance: f64,
-}
-
 /// What a rank sends in a step, on average over the steps of this process, set-up not counted.
 /// Without the linear solvers, which keep their own counts (`-log_view`).
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -89,6 +81,24 @@ pub struct Communication {
     /// Bytes that every rank holds for the whole grid: the table of owners, and on a mesh its
     /// adjacency.
     pub replicated_bytes: usize,
+}
+
+impl Communication {
+    /// What the ranks sent in `steps` steps, and what each holds of the whole. Collective.
+    pub fn of(world: &World, traffic: Traffic, steps: usize, replicated_bytes: usize) -> Self {
+        let per_step = 1.0 / steps.max(1) as f64;
+        let own = [traffic.messages as f64 * per_step, traffic.bytes as f64 * per_step];
+        let (largest, sum) = (world.max_slice(&own), world.sum_slice(&own));
+        let mean = |k: usize| sum[k] / world.size() as f64;
+        Communication {
+            messages_max: largest[0],
+            messages_mean: mean(0),
+            bytes_max: largest[1],
+            bytes_mean: mean(1),
+            reductions: traffic.reductions as f64 * per_step,
+            replicated_bytes,
+        }
+    }
 }
 
 /// Wall time by phase, s: the largest of all ranks.

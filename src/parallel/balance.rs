@@ -6,15 +6,13 @@
 //! materials. A new partition is taken if it is clearly better; after one that was not, the
 //! next attempt waits until the imbalance has grown.
 
-use crate::deck::model::Cost;
+use serde::Serialize;
+
+use crate::deck::model::{Cost, Parallel};
 use crate::error::Result;
-use crate::output::restart::run_state::RunState;
-use crate::output::summary::{BalanceReport, Communication};
-use crate::parallel::traffic::Traffic;
+use crate::grid::Grid;
 use crate::parallel::{Partition, World, migrate};
 use crate::points::Points;
-
-use crate::system::step_system::Model;
 
 /// A new partition must lower max/mean by at least this factor to be worth the move.
 const GAIN: f64 = 0.95;
@@ -22,6 +20,17 @@ const GAIN: f64 = 0.95;
 const PATIENCE: f64 = 1.05;
 /// Share of the newest measurement in a rank's smoothed seconds per point.
 const NEWEST: f64 = 0.3;
+
+/// What kept the ranks equally loaded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct BalanceReport {
+    /// New partitions taken.
+    pub rebalanced: usize,
+    /// Share of the points that changed rank for them, summed over all of them.
+    pub moved_share: f64,
+    /// Largest imbalance of the run.
+    pub largest_imbalance: f64,
+}
 
 /// What is remembered from step to step.
 #[derive(Debug, Clone, Default)]
@@ -49,21 +58,14 @@ impl Balance {
         self.report
     }
 
-    pub fn save(&self, state: &mut RunState) {
-        state.set("balance.refused", self.refused);
-        state.set("balance.moved_share", self.report.moved_share);
-        state.set("balance.largest_imbalance", self.report.largest_imbalance);
-        state.set_count("balance.rebalanced", self.report.rebalanced as u64);
+    /// What a run that is resumed has to know: [`Self::resume`].
+    pub fn memory(&self) -> (f64, BalanceReport) {
+        (self.refused, self.report)
     }
 
-    pub fn restore(&mut self, state: &RunState) -> Result<()> {
-        self.refused = state.number("balance.refused")?;
-        self.report = BalanceReport {
-            rebalanced: state.count("balance.rebalanced")? as usize,
-            moved_share: state.number("balance.moved_share")?,
-            largest_imbalance: state.number("balance.largest_imbalance")?,
-        };
-        Ok(())
+    /// Goes on from [`Self::memory`].
+    pub fn resume(&mut self, (refused, report): (f64, BalanceReport)) {
+        (self.refused, self.report) = (refused, report);
     }
 
     /// Cost of one point on this rank.
@@ -85,61 +87,67 @@ impl Balance {
     }
 }
 
-/// Migrates the points; where max/mean exceeds the deck's limit, tries a new partition and keeps
-/// it if it is clearly better. `busy`: seconds of work of this rank so far
-/// ([`crate::record::clock::Clock::busy`]). Collective.
-pub fn settle<const D: usize>(
-    world: &World,
-    model: &mut Model<D>,
-    points: &mut Points<D>,
-    busy: f64,
-) -> Result<Settled> {
-    let cost = model.deck.parallel.cost;
-    model.balance.measure(busy, points.len());
-    let all = world.sum_usize(points.len()).max(1) as f64;
-    let mut moved = migrate(world, &model.partition, &model.grid, points)?;
-    let mut load = points.len() as f64 * model.balance.cost_of_point(cost);
-    let before = of_loads(world, load);
-    let report = &mut model.balance.report;
-    report.largest_imbalance = report.largest_imbalance.max(before);
-    let limit = model.deck.parallel.rebalance_above;
-    let due = world.size() > 1 && limit > 0.0 && before > limit;
-    if due && before > PATIENCE * model.balance.refused {
-        match better_partition(world, model, points, before)? {
-            Some(partition) => {
-                model.partition = partition;
-                let migrated = migrate(world, &model.partition, &model.grid, points)?;
-                moved += migrated;
-                model.balance.refused = 0.0;
-                model.balance.report.rebalanced += 1;
-                model.balance.report.moved_share += migrated as f64 / all;
-                load = points.len() as f64 * model.balance.cost_of_point(cost);
+impl Balance {
+    /// Migrates the points; where max/mean exceeds the deck's limit, tries a new partition and keeps
+    /// it if it is clearly better. `busy`: seconds of work of this rank so far
+    /// (`record::clock::Clock::busy`). Collective.
+    pub fn settle<const D: usize>(
+        &mut self,
+        world: &World,
+        settings: &Parallel,
+        grid: &Grid<D>,
+        partition: &mut Partition<D>,
+        points: &mut Points<D>,
+        busy: f64,
+    ) -> Result<Settled> {
+        self.measure(busy, points.len());
+        let all = world.sum_usize(points.len()).max(1) as f64;
+        let mut moved = migrate(world, partition, grid, points)?;
+        let cost = self.cost_of_point(settings.cost);
+        let mut load = points.len() as f64 * cost;
+        let before = of_loads(world, load);
+        self.report.largest_imbalance = self.report.largest_imbalance.max(before);
+        let limit = settings.rebalance_above;
+        let due = world.size() > 1 && limit > 0.0 && before > limit;
+        if due && before > PATIENCE * self.refused {
+            match better_partition(world, settings, grid, partition, points, (before, cost))? {
+                Some(better) => {
+                    *partition = better;
+                    let migrated = migrate(world, partition, grid, points)?;
+                    moved += migrated;
+                    self.refused = 0.0;
+                    self.report.rebalanced += 1;
+                    self.report.moved_share += migrated as f64 / all;
+                    load = points.len() as f64 * cost;
+                }
+                None => self.refused = before,
             }
-            None => model.balance.refused = before,
         }
+        Ok(Settled { moved: moved as f64 / all, imbalance: of_loads(world, load) })
     }
-    Ok(Settled { moved: moved as f64 / all, imbalance: of_loads(world, load) })
 }
 
-/// A partition that is clearly more even than `before`, if there is one; in finer bricks if the
-/// deck leaves their size open and the present ones are too coarse.
+/// A partition that is clearly more even than `before`, if there is one, with the `cost` of a point
+/// on this rank; in finer bricks if the deck leaves their size open and the present ones are too
+/// coarse.
 fn better_partition<const D: usize>(
     world: &World,
-    model: &Model<D>,
+    settings: &Parallel,
+    grid: &Grid<D>,
+    partition: &Partition<D>,
     points: &Points<D>,
-    before: f64,
+    (before, cost): (f64, f64),
 ) -> Result<Option<Partition<D>>> {
-    let cost = model.balance.cost_of_point(model.deck.parallel.cost);
     let costs = vec![cost; points.len()];
     let attempt = |partition: &Partition<D>| -> Result<(Partition<D>, f64)> {
-        let candidate = partition.rebuild(world, &model.grid, points, Some(&costs))?;
-        let after = of_candidate(world, model, points, &candidate, cost);
+        let candidate = partition.rebuild(world, grid, points, Some(&costs))?;
+        let after = of_candidate(world, grid, points, &candidate, cost);
         Ok((candidate, after))
     };
-    let (mut best, mut after) = attempt(&model.partition)?;
-    if after > model.deck.parallel.rebalance_above
-        && model.deck.parallel.brick.is_none()
-        && let Some(finer) = model.partition.refined(&model.grid)
+    let (mut best, mut after) = attempt(partition)?;
+    if after > settings.rebalance_above
+        && settings.brick.is_none()
+        && let Some(finer) = partition.refined(grid)
     {
         let (candidate, finer_after) = attempt(&finer)?;
         if finer_after < GAIN * after {
@@ -152,14 +160,14 @@ fn better_partition<const D: usize>(
 /// Largest over mean if `candidate` were the partition.
 fn of_candidate<const D: usize>(
     world: &World,
-    model: &Model<D>,
+    grid: &Grid<D>,
     points: &Points<D>,
     candidate: &Partition<D>,
     cost: f64,
 ) -> f64 {
     let mut load = vec![0.0; world.size()];
-    for cell in model.grid.locate_each(points.position.iter()).flatten() {
-        load[candidate.owner_of_cell(&model.grid, cell)] += cost;
+    for cell in grid.locate_each(points.position.iter()).flatten() {
+        load[candidate.owner_of_cell(grid, cell)] += cost;
     }
     let load = world.sum_slice(&load);
     let largest = load.iter().copied().fold(0.0, f64::max);
@@ -173,27 +181,6 @@ fn of_loads(world: &World, load: f64) -> f64 {
 /// Largest over mean number of points per rank.
 pub fn imbalance(world: &World, points: usize) -> f64 {
     of_loads(world, points as f64)
-}
-
-/// What the ranks sent in `steps` steps, and what each holds of the whole. Collective.
-pub fn communication<const D: usize>(
-    world: &World,
-    model: &Model<D>,
-    traffic: Traffic,
-    steps: usize,
-) -> Communication {
-    let per_step = 1.0 / steps.max(1) as f64;
-    let own = [traffic.messages as f64 * per_step, traffic.bytes as f64 * per_step];
-    let (largest, sum) = (world.max_slice(&own), world.sum_slice(&own));
-    let mean = |k: usize| sum[k] / world.size() as f64;
-    Communication {
-        messages_max: largest[0],
-        messages_mean: mean(0),
-        bytes_max: largest[1],
-        bytes_mean: mean(1),
-        reductions: traffic.reductions as f64 * per_step,
-        replicated_bytes: model.partition.replicated_bytes(),
-    }
 }
 
 #[cfg(test)]
@@ -212,16 +199,5 @@ mod tests {
         assert_eq!(balance.rate, before);
         assert_eq!(balance.cost_of_point(Cost::Points), 1.0);
         assert_eq!(balance.cost_of_point(Cost::Time), before);
-    }
-
-    #[test]
-    fn the_state_goes_through_a_checkpoint() {
-        let report = BalanceReport { rebalanced: 3, moved_share: 0.4, largest_imbalance: 2.5 };
-        let balance = Balance { refused: 1.3, report, ..Balance::default() };
-        let mut state = RunState::new();
-        balance.save(&mut state);
-        let mut other = Balance::default();
-        other.restore(&state).unwrap();
-        assert_eq!((other.refused, other.report), (1.3, report));
     }
 }

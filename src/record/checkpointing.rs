@@ -26,8 +26,8 @@ use crate::parallel::World;
 use crate::parallel::signals::{self, Signal};
 use crate::points::Points;
 
-use crate::analysis::load_steps::Moment;
-use crate::system::step_system::Model;
+use super::step::Moment;
+use crate::system::model::Model;
 
 /// Writes checkpoints when the deck or a signal asks for them.
 #[derive(Debug)]

@@ -2,6 +2,8 @@
 //!
 //! | idea | file | source |
 //! |---|---|---|
+//! | world, model, points, recorder and clock of a run | `context.rs` | |
+//! | a finished step | `step.rs` | |
 //! | rows, frames, summary | `recorder.rs` | |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
@@ -11,7 +13,9 @@
 
 pub mod checkpointing;
 pub mod clock;
+pub mod context;
 pub mod ledger;
 pub mod reactions;
 pub mod recorder;
+pub mod step;
 pub mod verify;

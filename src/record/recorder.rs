@@ -7,6 +7,7 @@ use crate::cli::Voice;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every};
 use crate::error::{Error, Result};
+use crate::grid::Grid;
 use crate::output::directory::ResultsDirectory;
 use crate::output::extent::{body_summaries, peak_memory};
 use crate::output::restart::run_state::RunState;
@@ -14,7 +15,7 @@ use crate::output::series::grid_file::{GridFrame, GridSeries};
 use crate::output::series::point_field::PointField;
 use crate::output::series::points_file::PointsSeries;
 use crate::output::summary::Summary;
-use crate::output::summary::{BalanceReport, Communication, Count, Status};
+use crate::output::summary::{Communication, Count, Status};
 use crate::output::tables::csv_table::Mark;
 use crate::output::tables::history::History;
 use crate::output::tables::history::{HistoryRow, Layout};
@@ -22,13 +23,13 @@ use crate::output::tables::residuals::Residuals;
 use crate::output::terminal::log::Log;
 use crate::output::terminal::progress::{Interval, NewtonReport, Progress, StepReport};
 use crate::parallel::World;
+use crate::parallel::balance::{Balance, BalanceReport};
 use crate::points::Points;
-use crate::system::numbering::Numbering;
 
 use super::checkpointing::Checkpointer;
 use super::clock::Clock;
-use crate::analysis::load_steps::Moment;
-use crate::system::step_system::{Discretisation, Model};
+use super::step::{Moment, Solved};
+use crate::system::model::Model;
 
 /// Open files and running totals of one run.
 pub struct Recorder {
@@ -92,6 +93,44 @@ pub struct Resume {
     pub same_directory: bool,
 }
 
+/// The files of a run and who writes into them.
+pub struct Opening {
+    pub directory: ResultsDirectory,
+    pub log: Log,
+    pub versions: BTreeMap<String, String>,
+    pub checkpointer: Checkpointer,
+    pub resume: Option<Resume>,
+    pub voice: Voice,
+}
+
+/// What the summary tells beside what the recorder knows.
+pub struct Closing<'a> {
+    pub communication: Communication,
+    /// Figures of merit.
+    pub verify: BTreeMap<String, f64>,
+    pub ending: &'a Ending,
+}
+
+/// Puts what balances the ranks into a checkpoint.
+fn save_balance(balance: &Balance, state: &mut RunState) {
+    let (refused, report) = balance.memory();
+    state.set("balance.refused", refused);
+    state.set("balance.moved_share", report.moved_share);
+    state.set("balance.largest_imbalance", report.largest_imbalance);
+    state.set_count("balance.rebalanced", report.rebalanced as u64);
+}
+
+/// Takes what balances the ranks out of a checkpoint.
+pub fn restore_balance(balance: &mut Balance, state: &RunState) -> Result<()> {
+    let report = BalanceReport {
+        rebalanced: state.count("balance.rebalanced")? as usize,
+        moved_share: state.number("balance.moved_share")?,
+        largest_imbalance: state.number("balance.largest_imbalance")?,
+    };
+    balance.resume((state.number("balance.refused")?, report));
+    Ok(())
+}
+
 /// How a run ended.
 #[derive(Debug, Clone)]
 pub struct Ending {
@@ -119,17 +158,8 @@ impl Ending {
 impl Recorder {
     /// The files of a results directory: fresh ones, or those of the run that is resumed, which are
     /// read and tested. Nothing is written before [`Self::open`].
-    #[allow(clippy::too_many_arguments)]
-    pub fn create(
-        world: &World,
-        deck: &Deck,
-        directory: ResultsDirectory,
-        mut log: Log,
-        versions: BTreeMap<String, String>,
-        checkpointer: Checkpointer,
-        resume: Option<Resume>,
-        voice: Voice,
-    ) -> Result<Self> {
+    pub fn create(world: &World, deck: &Deck, opening: Opening) -> Result<Self> {
+        let Opening { directory, mut log, versions, checkpointer, resume, voice } = opening;
         let comm = world.comm();
         let layout = Layout {
             dimension: deck.dimension,
@@ -292,7 +322,7 @@ impl Recorder {
         mut state: RunState,
     ) -> Result<()> {
         self.save(&mut state);
-        model.balance.save(&mut state);
+        save_balance(&model.balance, &mut state);
         // A checkpoint counts on its rows: they are to outlast a power cut if it does.
         self.history.table.sync(world.comm())?;
         self.residuals.table.sync(world.comm())?;
@@ -470,32 +500,30 @@ impl Recorder {
         self.points.write(step, time, points, world.comm())
     }
 
-    /// Writes the active grid of the step just solved; vectors are per owned degree of freedom.
-    #[allow(clippy::too_many_arguments)]
+    /// Writes the active grid of the step just solved, on the `grid` that it was solved on.
     pub fn grid_frame<const D: usize>(
         &mut self,
         world: &World,
-        model: &Model<D>,
-        mesh: &Discretisation<D>,
+        grid: &Grid<D>,
+        solved: &Solved<D>,
         step: usize,
         time: f64,
-        displacement: &[f64],
-        reaction: &[f64],
     ) -> Result<()> {
-        let numbering: &Numbering = &mesh.numbering;
+        let Solved { mesh, displacement, reaction, .. } = solved;
+        let numbering = &mesh.numbering;
         let per_node = |values: &[f64]| -> Vec<[f64; D]> {
             values.chunks_exact(D).map(|v| std::array::from_fn(|a| v[a])).collect()
         };
         let owned = numbering.owned;
         let coordinates: Vec<[f64; D]> =
-            numbering.nodes[..owned].iter().map(|&node| model.grid.node_position(node)).collect();
+            numbering.nodes[..owned].iter().map(|&node| grid.node_position(node)).collect();
         let mut cells = Vec::new();
         let mut connectivity = Vec::new();
         let mut nodes = Vec::new();
         let on_face: std::collections::BTreeSet<usize> = mesh.ghost_cells.iter().copied().collect();
         for &(cell, _) in &mesh.populated.owned {
             nodes.clear();
-            model.grid.cell_nodes(cell, &mut nodes);
+            grid.cell_nodes(cell, &mut nodes);
             // A cell whose nodes this rank does not all know is written by nobody: it cannot
             // happen, as owners of populated cells reach their nodes.
             let numbers: Option<Vec<usize>> = nodes
@@ -509,7 +537,7 @@ impl Recorder {
         }
         let weights = mesh.node_weights(world)?;
         let frame = GridFrame {
-            element: model.grid.element(),
+            element: grid.element(),
             coordinates: &coordinates,
             connectivity: &connectivity,
             displacement_increment: &per_node(&displacement[..owned * D]),
@@ -527,17 +555,15 @@ impl Recorder {
     }
 
     /// The summary, and whether it could be written. Collective.
-    #[allow(clippy::too_many_arguments)]
     pub fn finish<const D: usize>(
         &mut self,
         world: &World,
         deck: &Deck,
         points: &Points<D>,
         clock: &Clock,
-        communication: Communication,
-        verify: BTreeMap<String, f64>,
-        ending: &Ending,
+        closing: Closing<'_>,
     ) -> (Summary, Result<()>) {
+        let Closing { communication, verify, ending } = closing;
         let bodies = body_summaries(points, deck.bodies.len(), deck.method.basis, world.comm());
         let summary = Summary {
             title: deck.title.clone(),
@@ -565,5 +591,22 @@ impl Recorder {
             written = written.and_then(|()| self.checkpointer.remove_superseded(world));
         }
         (summary, written)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_balance_goes_through_a_checkpoint() {
+        let report = BalanceReport { rebalanced: 3, moved_share: 0.4, largest_imbalance: 2.5 };
+        let mut balance = Balance::default();
+        balance.resume((1.3, report));
+        let mut state = RunState::new();
+        save_balance(&balance, &mut state);
+        let mut other = Balance::default();
+        restore_balance(&mut other, &state).unwrap();
+        assert_eq!(other.memory(), (1.3, report));
     }
 }

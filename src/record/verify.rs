@@ -11,6 +11,8 @@ use crate::output::series::point_field::PointField;
 use crate::parallel::World;
 use crate::points::Points;
 
+use super::context::Run;
+
 /// Figures by name, and what is to be said of those that could not be computed.
 #[derive(Debug, Default)]
 pub struct Figures {
@@ -28,6 +30,22 @@ impl Figures {
         }
         self.values.insert(name, value);
     }
+}
+
+/// Figures of merit at the end of a run; the log tells which have no value. Collective.
+pub fn of_run<const D: usize>(run: &mut Run<D>) -> Result<BTreeMap<String, f64>> {
+    let Run { world, model, points, recorder, .. } = run;
+    let (factor, time) = recorder.reached;
+    let time = if model.deck.analysis.kind.has_time() { time } else { factor };
+    let mut figures = figures(world, &model.deck.verify, points, factor, time)?;
+    if let Some(field) = &model.manufactured {
+        let materials = &model.materials;
+        manufactured(&mut figures, world, field, materials, points, factor, time);
+    }
+    for warning in &figures.warnings {
+        recorder.log.warn(warning);
+    }
+    Ok(figures.values)
 }
 
 /// Evaluates all entries of the deck at the present state. A difference that is not finite at one

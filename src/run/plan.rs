@@ -7,9 +7,9 @@ use crate::output::terminal::report::Plan;
 use crate::parallel::World;
 use crate::parallel::balance::imbalance;
 use crate::points::{Points, coverage};
+use crate::system::model::Model;
 use crate::system::numbering::Numbering;
 use crate::system::populated::Populated;
-use crate::system::step_system::Model;
 
 use super::plan_checks;
 

@@ -6,7 +6,7 @@ use crate::deck::rough;
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
-use crate::system::step_system::Model;
+use crate::system::model::Model;
 
 /// rho g H / E and rho g H / strength of ordinary problems lie between these. A column of rubber
 /// that its weight halves has the largest, a metre of steel the smallest; a slip of a unit is a
@@ -108,8 +108,7 @@ pub fn steps<const D: usize>(
         return (text, steps as f64);
     }
     let times = TimeSteps::new(analysis);
-    let mass = model.deck.method.mass;
-    let limit = stability_limit(world, &model.grid, &model.materials, mass, points).0;
+    let limit = stability_limit(world, model, points).0;
     let Some(StepSpan { time_start, time_end, .. }) = times.next(limit) else {
         return (None, 0.0);
     };

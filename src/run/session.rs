@@ -27,12 +27,15 @@ use crate::petsc::{files, known};
 use super::start_checks::formulas;
 use super::start_checks::support;
 use super::{plan, process, setup};
-use crate::analysis::{conditioning, explicit, implicit_dynamic};
-use crate::analysis::{quasi_static, solver};
-use crate::parallel::balance;
+use crate::analysis::explicit::Explicit;
+use crate::analysis::implicit::{self, Implicit};
+use crate::analysis::{conditioning, solver, time_loop};
+use crate::output::summary::Communication;
 use crate::record::checkpointing::{self, Checkpointer};
 use crate::record::clock::Clock;
-use crate::record::recorder::{Ending, Recorder, Resume};
+use crate::record::context::Run;
+use crate::record::recorder::{Closing, Ending, Opening, Recorder, Resume, restore_balance};
+use crate::record::verify;
 use crate::system::step_system;
 use crate::transfer::update;
 
@@ -118,10 +121,10 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     if let Some(text) = launcher::warning(world.size(), mpi, |name| std::env::var(name).ok()) {
         log.say(&text);
     }
-    let run = Run { world, session: &session, arguments, text, versions, log };
+    let start = Start { world, session: &session, arguments, text, versions, log };
     let outcome = match deck.dimension {
-        2 => run.in_space::<2>(deck),
-        _ => run.in_space::<3>(deck),
+        2 => start.in_space::<2>(deck),
+        _ => start.in_space::<3>(deck),
     };
     session.end(outcome)
 }
@@ -161,7 +164,7 @@ fn versions() -> BTreeMap<String, String> {
 }
 
 /// What a run knows before its dimension.
-struct Run<'a> {
+struct Start<'a> {
     world: &'a World,
     session: &'a Session<'a>,
     arguments: &'a Arguments,
@@ -170,7 +173,7 @@ struct Run<'a> {
     log: Log,
 }
 
-impl Run<'_> {
+impl Start<'_> {
     fn in_space<const D: usize>(mut self, deck: Deck) -> Result<()> {
         let world = self.world;
         let mut clock = Clock::new(Some(Stages::register()?));
@@ -182,7 +185,7 @@ impl Run<'_> {
             // Before a checkpoint is chosen: the run that has the directory may be writing one.
             lock.take(false, &mut self.log, comm)?;
         }
-        let (mut model, mut points, resume) = match &self.arguments.restart {
+        let (model, points, resume) = match &self.arguments.restart {
             None => {
                 let (model, points) = setup::prepare::<D>(world, deck)?;
                 (model, points, None)
@@ -198,7 +201,7 @@ impl Run<'_> {
                     same_directory: checkpointing::lies_in(world, &found.path, out),
                 };
                 let (mut model, points) = setup::restore(world, deck, found)?;
-                model.balance.restore(&resume.state)?;
+                restore_balance(&mut model.balance, &resume.state)?;
                 (model, points, Some(resume))
             }
         };
@@ -212,7 +215,7 @@ impl Run<'_> {
             None => formulas::check(world, &model, &points, &active.1)?,
             Some(_) => Vec::new(),
         };
-        let first = quasi_static::first_span(&model.deck);
+        let first = implicit::first_span(&model.deck);
         match model.deck.analysis.kind {
             AnalysisType::QuasiStatic if resume.is_none() => {
                 support::require(world, &model, &points, &active, first)?;
@@ -245,8 +248,8 @@ impl Run<'_> {
         let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
         let (log, versions, into) = (self.log, self.versions, directory.clone());
         let voice = self.arguments.voice;
-        let mut recorder =
-            Recorder::create(world, &model.deck, into, log, versions, checkpointer, resume, voice)?;
+        let opening = Opening { directory: into, log, versions, checkpointer, resume, voice };
+        let mut recorder = Recorder::create(world, &model.deck, opening)?;
         // All of the earlier part is known to fit: now it may be changed.
         if let (Some((used, step)), Some(choice)) = (&earlier, &self.arguments.restart) {
             checkpointing::set_later_aside(world, out, choice, used, *step)?;
@@ -261,19 +264,17 @@ impl Run<'_> {
         process::before_steps();
         clock.end_setup();
 
-        let outcome = match model.deck.analysis.kind {
-            AnalysisType::QuasiStatic => {
-                quasi_static::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+        let mut run = Run { world, model, points, recorder, clock };
+        let outcome = match run.model.deck.analysis.kind {
+            AnalysisType::QuasiStatic | AnalysisType::ImplicitDynamic => {
+                let mut analysis = Implicit::new(&run);
+                time_loop::run(&mut run, &mut analysis)
             }
             AnalysisType::Explicit => {
-                explicit::run(world, &mut model, &mut points, &mut recorder, &mut clock)
+                let mut analysis = Explicit::new(&run);
+                time_loop::run(&mut run, &mut analysis)
             }
-            AnalysisType::Conditioning => {
-                conditioning::run(world, &mut model, &mut points, &mut recorder, &mut clock)
-            }
-            AnalysisType::ImplicitDynamic => {
-                implicit_dynamic::run(world, &mut model, &mut points, &mut recorder, &mut clock)
-            }
+            AnalysisType::Conditioning => conditioning::run(&mut run),
         };
         let mut of_numerics = true;
         let (ending, kind): (_, fn(String) -> Error) = match outcome {
@@ -287,51 +288,52 @@ impl Run<'_> {
                     _ => Error::Run,
                 };
                 if of_files {
-                    recorder.leave_unrecorded();
+                    run.recorder.leave_unrecorded();
                 }
-                let (text, step) = (error.to_string(), recorder.steps_completed + 1);
+                let (text, step) = (error.to_string(), run.recorder.steps_completed + 1);
                 // A file has its step in its name.
                 let named = of_files || text.starts_with("step ");
                 let text = if named { text } else { format!("step {step}: {text}") };
                 (Ending::failed(text), kind)
             }
         };
-        let figures = quasi_static::figures(world, &model, &points, &mut recorder)?;
+        let figures = verify::of_run(&mut run)?;
         let unused = self.session.unused_options()?;
         if !unused.is_empty() {
             let text = format!("PETSc options that nothing used: {}", unused.join(", "));
-            recorder.log.warn(&text);
+            run.recorder.log.warn(&text);
         }
-        let (traffic, steps) = (clock.traffic(), recorder.steps_here());
-        let sent = balance::communication(world, &model, traffic, steps);
+        let (traffic, steps) = (run.clock.traffic(), run.recorder.steps_here());
+        let sent = Communication::of(world, traffic, steps, run.model.partition.replicated_bytes());
+        let closing = Closing { communication: sent, verify: figures, ending: &ending };
         let (summary, written) =
-            recorder.finish(world, &model.deck, &points, &clock, sent, figures, &ending);
+            run.recorder.finish(world, &run.model.deck, &run.points, &run.clock, closing);
         let (ending, kind): (_, fn(String) -> Error) = match written {
             Err(error) if ending.status == Status::Completed => {
                 (Ending::failed(error.to_string()), Error::File)
             }
             // What happened first is what the run is to say.
             written => {
-                recorder.warn_of_files(written)?;
+                run.recorder.warn_of_files(written)?;
                 (ending, kind)
             }
         };
-        recorder.log.say(&report::closing(&summary, &recorder.directory()));
+        run.recorder.log.say(&report::closing(&summary, &run.recorder.directory()));
         if ending.status == Status::Completed {
             return Ok(());
         }
         let failure = Failure {
             what: ending.reason.clone(),
-            last_good_step: Some(recorder.steps_completed),
-            results: Some(recorder.directory()),
+            last_good_step: Some(run.recorder.steps_completed),
+            results: Some(run.recorder.directory()),
             // Whoever sent a signal needs no advice, and no numerics heals a deck, a full disk or an
             // option that PETSc refuses.
             advice: match kind(String::new()).exit_code() {
                 _ if ending.on_request => Vec::new(),
-                3 => vec![checkpointing::advice(world, &recorder.directory())],
+                3 => vec![checkpointing::advice(world, &run.recorder.directory())],
                 // What is missing there is said already, and no step is small enough.
                 _ if !of_numerics || ending.reason.contains(update::NOT_HELD) => Vec::new(),
-                _ => advice(&model.deck),
+                _ => advice(&run.model.deck),
             },
             ..Failure::default()
         };
@@ -339,7 +341,7 @@ impl Run<'_> {
     }
 }
 
-impl Run<'_> {
+impl Start<'_> {
     /// What must outlast the preparation of the results directory.
     fn inputs(&self, deck: &Deck) -> Inputs {
         let mut files = deck.files();

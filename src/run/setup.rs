@@ -18,7 +18,7 @@ use crate::points::share::Share;
 use super::materials::{self, Overview};
 use super::start_checks::memory;
 use crate::parallel::balance::Balance;
-use crate::system::step_system::Model;
+use crate::system::model::Model;
 
 /// Builds the model and this rank's points. Collective.
 pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {

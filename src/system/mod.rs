@@ -3,6 +3,7 @@
 //!
 //! | file | idea |
 //! |---|---|
+//! | `model.rs` | the deck made computable: what stays while points move |
 //! | `step_system.rs` | locate, map and number: the grid side of a step |
 //! | `populated.rs` | which cells hold material, and whose |
 //! | `numbering.rs` | equations over active nodes, contiguous by rank |
@@ -27,6 +28,7 @@ pub mod graph;
 pub mod held;
 pub mod in_place;
 pub mod kernel;
+pub mod model;
 pub mod node_index;
 pub mod numbering;
 pub mod pattern;

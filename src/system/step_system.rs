@@ -3,76 +3,20 @@
 use super::border::Border;
 use super::conditions::{Conditions, StepSpan};
 use super::face_points;
+use super::model::Model;
 use super::numbering::Numbering;
 use super::numbering::Touched;
 use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use crate::basis::{self, Groups, Influences};
-use crate::deck::Deck;
-use crate::deck::model::{Basis, PointVolume, Tangent};
+use crate::deck::model::{Basis, PointVolume};
 use crate::error::Result;
-use crate::ghost::stencil::Penalty;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
 use crate::grid::{FacePair, Grid};
-use crate::loads::manufactured::Manufactured;
-use crate::loads::point_forces;
 use crate::material::Material;
-use crate::output::tables::history::HistoryRow;
-use crate::parallel::{Partition, World};
+use crate::parallel::World;
 use crate::points::Points;
-
-use crate::parallel::balance::{Balance, imbalance};
-
-/// What stays the same while points move: the deck made computable.
-pub struct Model<const D: usize> {
-    pub deck: Deck,
-    pub grid: Grid<D>,
-    pub partition: Partition<D>,
-    /// One per body.
-    pub materials: Vec<Material>,
-    /// One per body.
-    pub penalties: Vec<Penalty>,
-    /// Mean stiffness scale of each body, Pa: what Ghost stiffness and penalties are factors of.
-    pub stiffness: Vec<f64>,
-    /// Whether the tangent of every material is symmetric in every state.
-    pub symmetric: bool,
-    /// The field of a `manufactured` load with its derivatives.
-    pub manufactured: Option<Manufactured>,
-    pub balance: Balance,
-}
-
-impl<const D: usize> Model<D> {
-    /// Whether every body has Ghost stiffness.
-    pub fn stabilised(&self) -> bool {
-        self.penalties.iter().all(|penalty| penalty.stiffness > 0.0)
-    }
-
-    /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the
-    /// deck does not ask for the general path.
-    pub fn symmetric(&self) -> bool {
-        self.deck.analysis.tangent == Tangent::Auto && self.symmetric
-    }
-
-    /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.
-    pub fn point_forces(
-        &self,
-        world: &World,
-        points: &Points<D>,
-        load_factor: f64,
-        time: f64,
-    ) -> Result<Vec<[f64; D]>> {
-        world.fail_together(point_forces::point_forces(
-            points,
-            &self.materials,
-            &self.deck.loads,
-            self.manufactured.as_ref(),
-            self.deck.analysis.kind,
-            load_factor,
-            time,
-        ))
-    }
-}
 
 /// Everything a step needs that depends on where the points are at its start.
 pub struct Discretisation<const D: usize> {
@@ -136,16 +80,6 @@ impl<const D: usize> Discretisation<D> {
             span,
         )?;
         Ok((mesh, conditions))
-    }
-
-    /// What a history row says of the grid side, the rest of the row at its defaults. Collective.
-    pub fn row(&self, world: &World, points: &Points<D>) -> HistoryRow {
-        HistoryRow {
-            ghost_faces: world.sum_usize(self.faces.len()),
-            populated_cells: world.sum_usize(self.populated.owned.len()),
-            imbalance: imbalance(world, points.len()),
-            ..HistoryRow::default()
-        }
     }
 
     /// As [`Self::new`]. Collective.

@@ -2,14 +2,16 @@
 
 use crate::deck::Deck;
 use crate::deck::model::{self, MeshMotion, Place};
-use crate::error::{Error, Result};
+use crate::error::Error;
 use crate::grid::Grid;
 use crate::parallel::World;
 use crate::system::conditions::StepSpan;
 use crate::system::numbering::Numbering;
 
-/// The grid after the step, or `None` where it does not move. The inner `Err` says which cell
-/// would turn over. `displacement` holds the local nodes' increments. Collective.
+use super::refusal::{Cause, Halt, Refusal};
+
+/// The grid after the step, or `None` where it does not move. Refused where a cell would turn over.
+/// `displacement` holds the local nodes' increments. Collective.
 pub fn moved<const D: usize>(
     world: &World,
     deck: &Deck,
@@ -17,13 +19,13 @@ pub fn moved<const D: usize>(
     numbering: &Numbering,
     displacement: &[f64],
     span: StepSpan,
-) -> Result<std::result::Result<Option<Grid<D>>, String>> {
+) -> std::result::Result<Option<Grid<D>>, Halt> {
     let (Grid::Mesh(mesh), model::Grid::Mesh(settings)) = (grid, &deck.grid) else {
-        return Ok(Ok(None));
+        return Ok(None);
     };
     let motion = &settings.motion;
     if *motion == MeshMotion::Fixed {
-        return Ok(Ok(None));
+        return Ok(None);
     }
     let rotation = match motion {
         MeshMotion::RotateWith(tag) => rotation_of(deck, tag, span),
@@ -40,9 +42,9 @@ pub fn moved<const D: usize>(
         rotation,
     );
     match outcome {
-        Ok(()) => Ok(Ok(Some(Grid::Mesh(mesh)))),
-        Err(Error::Run(why)) => Ok(Err(why)),
-        Err(error) => Err(error),
+        Ok(()) => Ok(Some(Grid::Mesh(mesh))),
+        Err(Error::Run(what)) => Err(Refusal { cause: Cause::Cell, what }.into()),
+        Err(error) => Err(error.into()),
     }
 }
 

@@ -5,6 +5,7 @@
 //! | sums over points at the nodes, and back | `mapping.rs` | Ghost eq. 6, 8-10 |
 //! | nodal sums across ranks | `nodal_sums.rs` | |
 //! | points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
+//! | why a step cannot be applied | `refusal.rs` | |
 //! | what carries the points | `transport.rs` | Ghost eq. 9 |
 //! | back to a step's start where it fails | `undo.rs` | |
 //! | the mesh between steps | `mesh_motion.rs` | Rotation §2 (viii) |
@@ -12,6 +13,7 @@
 pub mod mapping;
 pub mod mesh_motion;
 pub mod nodal_sums;
+pub mod refusal;
 pub mod transport;
 pub mod undo;
 pub mod update;

@@ -16,10 +16,12 @@ use crate::material::{Material, local};
 use crate::mechanics::{self, BATCH, StepStart, StressState};
 use crate::parallel::World;
 use crate::points::Points;
+use crate::system::model::Model;
 use crate::system::numbering::Numbering;
 use crate::system::terms::stress::{StepPoints, displacement_gradient};
 use crate::tensor::dense;
 
+use super::refusal::{Cause, Refusal};
 use super::undo::{Former, Snapshot};
 
 /// Increments at each point of this rank, computed but not yet applied.
@@ -28,7 +30,7 @@ pub struct Increments<const D: usize> {
     pub deformation: Vec<[[f64; D]; D]>,
     /// m
     pub displacement: Vec<[f64; D]>,
-    /// Where the corners of `cpdi2` domains go, m; empty until [`unsound_domain`] has found it.
+    /// Where the corners of `cpdi2` domains go, m; empty until [`require_sound_domains`] has found it.
     pub corners: Vec<[[f64; D]; 8]>,
 }
 
@@ -69,29 +71,21 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
     made
 }
 
-/// Why a step cannot be applied, the same on every rank.
-#[derive(Debug)]
-pub struct Refusal {
-    pub why: String,
-    /// It turns a point inside out.
-    pub inverted: bool,
-}
-
 /// How a refusal says that no boundary keeps points from leaving through a side.
 pub const NOT_HELD: &str = "no boundary holds that side";
 
-/// Says why the increments cannot be accepted, if so: a NaN, an inverted point, a point outside
-/// the grid (as it is after the step), where it tells which of the `boundaries` holds there. Collective.
-pub fn reason_to_refuse<const D: usize>(
+/// Refuses increments with a NaN, an inverted point or a point outside the grid (as it is after the
+/// step), of which it tells which of the `boundaries` holds there. Collective.
+pub fn require_sound<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     boundaries: &[Boundary],
     points: &Points<D>,
     increments: &Increments<D>,
-) -> Option<Refusal> {
+) -> std::result::Result<(), Refusal> {
     // Neighbours in the list are mostly neighbours in space.
     let near = Cell::new(None);
-    refused(world, points, |p| {
+    require(world, points, |p| {
         let x = points.position[p];
         let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
         if moved.iter().any(|m| !m.is_finite()) {
@@ -141,13 +135,13 @@ fn way_out<const D: usize>(grid: &Grid<D>, boundaries: &[Boundary], place: &[f64
     format!("through its {side} side ({name} = {} m), {known}", figure(end))
 }
 
-/// [`reason_to_refuse`] of dF - 1 alone. Collective.
-pub fn deformation_to_refuse<const D: usize>(
+/// [`require_sound`] of dF - 1 alone. Collective.
+pub fn require_sound_deformation<const D: usize>(
     world: &World,
     points: &Points<D>,
     deformation: &[[[f64; D]; D]],
-) -> Option<Refusal> {
-    refused(world, points, |p| fault_of(&deformation[p]))
+) -> std::result::Result<(), Refusal> {
+    require(world, points, |p| fault_of(&deformation[p]))
 }
 
 /// What is wrong with the increment of a point.
@@ -167,14 +161,15 @@ fn fault_of<const D: usize>(increment: &[[f64; D]; D]) -> Option<Fault> {
     (determinant <= 0.0).then_some(Fault::Inverted(determinant))
 }
 
-/// The first point of the lowest rank with a fault. Collective.
-fn refused<const D: usize>(
+/// Refuses the first point of the lowest rank with a fault. Collective.
+fn require<const D: usize>(
     world: &World,
     points: &Points<D>,
     fault: impl Fn(usize) -> Option<Fault>,
-) -> Option<Refusal> {
+) -> std::result::Result<(), Refusal> {
     let found = (0..points.len()).find_map(|p| fault(p).map(|fault| (p, fault)));
     let inverted = matches!(found, Some((_, Fault::Inverted(_))));
+    let not_finite = matches!(found, Some((_, Fault::NotFinite)));
     let message = found.map(|(p, fault)| {
         let what = match fault {
             Fault::NotFinite => "has a displacement that is not finite".to_string(),
@@ -185,8 +180,13 @@ fn refused<const D: usize>(
         };
         format!("point {} at {:?} {what}", points.id[p], points.position[p])
     });
-    let why = world.first_message(message)?;
-    Some(Refusal { why, inverted: world.any(inverted) })
+    let Some(what) = world.first_message(message) else { return Ok(()) };
+    let cause = match (world.any(inverted), world.any(not_finite)) {
+        (true, _) => Cause::Inverted,
+        (_, true) => Cause::NotFinite,
+        _ => Cause::Leaves,
+    };
+    Err(Refusal { cause, what })
 }
 
 /// The first point of this rank whose state is not a number, if any.
@@ -201,10 +201,10 @@ pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
     ))
 }
 
-/// Says which CPDI domain the step would turn over or carry out of `after`, the grid of the next
-/// step, if any; otherwise `increments` learn where the corners of `cpdi2` go. `displacement`: local
+/// Refuses a step that would turn a CPDI domain over or carry it out of `after`, the grid of the next
+/// step; otherwise `increments` learn where the corners of `cpdi2` go. `displacement`: local
 /// nodes, m. Collective.
-pub fn unsound_domain<const D: usize>(
+pub fn require_sound_domains<const D: usize>(
     world: &World,
     [grid, after]: [&Grid<D>; 2],
     basis: Basis,
@@ -212,9 +212,9 @@ pub fn unsound_domain<const D: usize>(
     displacement: &[f64],
     points: &Points<D>,
     increments: &mut Increments<D>,
-) -> Option<String> {
+) -> std::result::Result<(), Refusal> {
     if !matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
-        return None;
+        return Ok(());
     }
     let nodal = |node| nodal_displacement(numbering, displacement, node);
     let mut hint = None;
@@ -229,7 +229,10 @@ pub fn unsound_domain<const D: usize>(
         cpdi1::check_step(after, points, p, &increment, moved, &mut hint)
     };
     let reason = (0..points.len()).find_map(|p| check(p).err());
-    world.first_message(reason.map(|error| error.to_string()))
+    match world.first_message(reason.map(|error| error.to_string())) {
+        Some(what) => Err(Refusal { cause: Cause::Domain, what }),
+        None => Ok(()),
+    }
 }
 
 /// m; zero where no equation lives.
@@ -246,21 +249,16 @@ fn nodal_displacement<const D: usize>(
 
 /// Applies the increments: F, b_e, stress, history, domains, positions. What they overwrite is kept
 /// where a snapshot `before` is given, here and below.
-#[allow(clippy::too_many_arguments)]
 pub fn apply<const D: usize>(
-    grid: &Grid<D>,
-    materials: &[Material],
-    basis: Basis,
-    rule: DomainUpdate,
+    model: &Model<D>,
     numbering: &Numbering,
     displacement: &[f64],
     increments: &Increments<D>,
     points: &mut Points<D>,
     mut before: Option<&mut Snapshot<D>>,
 ) -> Result<()> {
-    deform(materials, &increments.deformation, points, before.as_deref_mut());
-    let kept = before.as_deref_mut();
-    follow(grid, basis, rule, numbering, displacement, increments, points, kept)?;
+    deform(&model.materials, &increments.deformation, points, before.as_deref_mut());
+    follow(model, numbering, displacement, increments, points, before.as_deref_mut())?;
     move_points(&increments.displacement, points, before);
     Ok(())
 }
@@ -380,18 +378,16 @@ pub fn respond<const D: usize>(
 
 /// Lets the domains follow the deformation (Lagrangian eq. 32-39); the positions are still
 /// those of the step's start. `displacement` is the one that made the increments, which
-/// [`unsound_domain`] has passed. Returns how many domains had grown far beyond the stretch.
-#[allow(clippy::too_many_arguments)]
+/// [`require_sound_domains`] has passed. Returns how many domains had grown far beyond the stretch.
 pub fn follow<const D: usize>(
-    grid: &Grid<D>,
-    basis: Basis,
-    rule: DomainUpdate,
+    model: &Model<D>,
     numbering: &Numbering,
     displacement: &[f64],
     increments: &Increments<D>,
     points: &mut Points<D>,
     before: Option<&mut Snapshot<D>>,
 ) -> Result<usize> {
+    let (basis, rule) = (model.deck.method.basis, model.deck.method.domain_update);
     if let Some(before) = before {
         before.half_length.copy(&points.half_length);
         if basis == Basis::Cpdi2 {
@@ -406,7 +402,7 @@ pub fn follow<const D: usize>(
         _ => Vec::new(),
     };
     let nodal = |node| nodal_displacement(numbering, displacement, node);
-    update_domains(grid, basis, rule, points, &whole, &nodal)
+    update_domains(&model.grid, basis, rule, points, &whole, &nodal)
 }
 
 /// Lagrangian eq. 31, Ghost eq. 9, 14.

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use counts::Numbers;
 use limits::Machine;
-use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings};
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use mpm_par::analysis::solver;
 use mpm_par::error::Result;
 use mpm_par::mechanics::{self, StepStart};
@@ -22,9 +22,10 @@ use mpm_par::petsc::snes::NewtonProblem;
 use mpm_par::points::Points;
 use mpm_par::run::setup;
 use mpm_par::system::conditions::{Conditions, StepSpan};
+use mpm_par::system::model::Model;
 use mpm_par::system::numbering::Numbering;
 use mpm_par::system::scatter::BlockMatrix;
-use mpm_par::system::step_system::{Discretisation, Model};
+use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::stress::{self, displacement_gradient};
 use mpm_par::transfer::update;
 use mpm_par::{basis, deck};
@@ -348,9 +349,13 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     let owned = numbering.owned * D;
     let empty = || solver::matrix(world, &model, numbering, &mesh.pattern);
     let equations = || {
-        let external = vec![0.0; owned];
-        let grid = &model.grid;
-        Equilibrium::new(world, grid, &mesh, step, &conditions, &left_out, external, settings)
+        let equations = StepEquations {
+            conditions: &conditions,
+            left_out: &left_out,
+            external_owned: vec![0.0; owned],
+            inertia: None,
+        };
+        Equilibrium::new(world, &model.grid, &mesh, step, equations, settings)
     };
     let matrix_cost = sample(count, || {
         black_box((empty().is_ok(), equations().is_ok()));
@@ -378,18 +383,8 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     let update = sample(count, || {
         let made = update::increments(step, &displacement);
         let mut moved = copies.pop().expect("one copy a run");
-        update::apply(
-            &model.grid,
-            &model.materials,
-            model.deck.method.basis,
-            model.deck.method.domain_update,
-            numbering,
-            &displacement,
-            &made,
-            &mut moved,
-            None,
-        )
-        .expect("the increments are sound");
+        update::apply(&model, numbering, &displacement, &made, &mut moved, None)
+            .expect("the increments are sound");
         black_box(&moved);
     });
     Ok(Costs {

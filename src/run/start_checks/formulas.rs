@@ -13,8 +13,8 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 
-use crate::analysis::quasi_static;
-use crate::system::step_system::Model;
+use crate::analysis::implicit;
+use crate::system::model::Model;
 
 /// Evaluates initial velocities, and loads and boundaries at both ends of the first step, at all
 /// points and nodes. Returns warnings. Errors name the key, its line and a point. Collective.
@@ -34,7 +34,7 @@ pub fn check<const D: usize>(
 
 /// The first step; with a step that follows the stability limit only its begin is known.
 fn first_span(deck: &Deck) -> StepSpan {
-    let span = quasi_static::first_span(deck);
+    let span = implicit::first_span(deck);
     match (deck.analysis.steps, deck.analysis.duration) {
         (Some(_), Some(duration)) => StepSpan { time_end: span.factor_end * duration, ..span },
         (None, _) => StepSpan { factor_end: 0.0, ..span },

@@ -18,7 +18,8 @@ use crate::system::numbering::Touched;
 use crate::system::populated::Populated;
 
 use super::pieces;
-use crate::system::step_system::{self, Model};
+use crate::system::model::Model;
+use crate::system::step_system;
 
 /// Share of the largest eigenvalue below which a motion counts as free. The rows are exact but
 /// for rounding; a held line of a thousandth of the body's length leaves 1e-6.

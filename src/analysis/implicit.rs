@@ -1,0 +1,299 @@
+//! f_int(u) + K_G u (+ inertia) = f_ext, step by step: quasi-static analysis (Lagrangian §6.3-6.5,
+//! Ghost §2.4) and implicit dynamics, which is the same with inertia ([`super::inertial`]). A step:
+//! locate, map, number, {assemble, solve}*, update.
+
+use crate::deck::Deck;
+use crate::deck::model::AnalysisType;
+use crate::error::Result;
+use crate::loads::point_forces::map_forces;
+use crate::output::restart::run_state::RunState;
+use crate::output::tables::history::HistoryRow;
+use crate::parallel::World;
+use crate::petsc::log::Phase;
+use crate::points::Points;
+use crate::record::context::Run;
+use crate::record::reactions::{at_held, reactions};
+use crate::record::step::{Moment, Solved, grid_side};
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::model::Model;
+use crate::system::numbering::Numbering;
+use crate::system::step_system::{Coupling, Discretisation};
+use crate::transfer::refusal::Halt;
+use crate::transfer::update;
+
+use super::equilibrium::StepEquations;
+use super::inertial::{Dynamics, InertialStep};
+use super::load_steps::Stepping;
+use super::newton::{self, Carried};
+use super::solver::Trials;
+use super::time_loop::{Analysis, Answer, Manner, Next};
+
+/// Both implicit analyses between their steps.
+pub struct Implicit<const D: usize> {
+    steps: usize,
+    stepping: Stepping,
+    trials: Trials,
+    /// Of the quasi-static analysis.
+    totals: Totals,
+    /// `None` without inertia.
+    dynamics: Option<Dynamics<D>>,
+}
+
+impl<const D: usize> Implicit<D> {
+    /// Before the first step. Collective.
+    pub fn new(run: &Run<D>) -> Self {
+        let analysis = &run.model.deck.analysis;
+        let dynamic = analysis.kind == AnalysisType::ImplicitDynamic;
+        let steps = analysis.steps.unwrap_or(1);
+        // Without time the load factor serves as the time of formulas.
+        let duration = if dynamic { analysis.duration.unwrap_or(1.0) } else { 1.0 };
+        Implicit {
+            steps,
+            stepping: Stepping::new(steps, duration, analysis.on_failure, analysis.smallest_step),
+            trials: Trials::default(),
+            totals: Totals::default(),
+            dynamics: dynamic.then(|| Dynamics::new(run)),
+        }
+    }
+}
+
+impl<const D: usize> Analysis<D> for Implicit<D> {
+    fn manner(&self) -> Manner {
+        Manner { newton: true, time: self.dynamics.is_some(), steps: Some(self.steps) }
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.stepping.restore(state)?;
+        self.trials.restore(state);
+        match &mut self.dynamics {
+            Some(dynamics) => dynamics.restore(state),
+            None => self.totals.restore(state),
+        }
+    }
+
+    fn state(&self) -> RunState {
+        let mut state = RunState::new();
+        self.stepping.save(&mut state);
+        self.trials.save(&mut state);
+        match &self.dynamics {
+            Some(dynamics) => dynamics.save(&mut state),
+            None => self.totals.save(&mut state),
+        }
+        state
+    }
+
+    fn next(&self) -> Option<Next> {
+        let number = self.stepping.step_number();
+        self.stepping.next_span().map(|span| Next { span, number })
+    }
+
+    fn step(&mut self, run: &mut Run<D>, next: Next) -> std::result::Result<Solved<D>, Halt> {
+        let Next { span, number } = next;
+        if let Some(dynamics) = &mut self.dynamics {
+            dynamics.before.begin();
+        }
+        let Run { world, model, points, clock, .. } = &mut *run;
+        let (mesh, conditions) = clock.time(Phase::Locate, || {
+            Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
+        })?;
+        let (loads, left_out) = clock.time(Phase::Assemble, || {
+            let loads = Loads::of_step(world, model, points, &mesh, span)?;
+            Ok((loads, mesh.nodes_left_out(world, model.deck.method.drop_below)))
+        })?;
+        let inertial = match &self.dynamics {
+            Some(_) => Some(InertialStep::begin(run, &mesh, &conditions, &left_out, &loads, span)?),
+            None => None,
+        };
+        let Run { clock, .. } = &mut *run;
+        let (driving, inertia) = clock.time(Phase::Assemble, || {
+            Ok(match &inertial {
+                Some(inertial) => inertial.equations(&mesh, &loads),
+                None => (loads.external_end.clone(), None),
+            })
+        })?;
+        let (conditions, left_out) = (&conditions, &left_out[..]);
+        let equations =
+            StepEquations { conditions, left_out, external_owned: driving.clone(), inertia };
+        let solved = newton::solve(run, &mesh, equations, &mut self.trials, number)?;
+        let displacement = solved.displacement;
+
+        let Run { world, model, points, clock, .. } = &mut *run;
+        let carry = || Ok(newton::carried(world, model, &mesh, points, &displacement, span));
+        let Carried { made, moved_grid } = clock.time(Phase::Update, carry)??;
+
+        // What the boundaries supply, in the mean and at both ends of the step.
+        let out_of_balance: Vec<f64> =
+            solved.internal.iter().zip(&driving).map(|(force, driving)| force - driving).collect();
+        let (supplied, ends) = match &inertial {
+            Some(inertial) => inertial.supplied(model, &mesh, out_of_balance),
+            None => (out_of_balance, [solved.internal_start, solved.internal]),
+        };
+        let external = [&loads.external_start[..], &loads.external_end];
+        let work = work_of_step::<D>(
+            conditions,
+            &mesh.numbering,
+            &displacement,
+            external,
+            [&ends[0], &ends[1]],
+        );
+        let rates = inertial.as_ref().map(|inertial| inertial.rates_at_end(&displacement));
+        let mut before = self.dynamics.as_mut().map(|dynamics| &mut dynamics.before);
+        let energies = clock.time(Phase::Update, || {
+            let of_points = inertial.as_ref().zip(rates.as_ref()).map(|(inertial, rates)| {
+                inertial.rates_of_points(model, mesh.step_points(points, &model.materials), rates)
+            });
+            let (numbering, kept) = (&mesh.numbering, before.as_deref_mut());
+            let updated = update::apply(model, numbering, &displacement, &made, points, kept);
+            world.fail_together(updated)?;
+            if let (Some(rates), Some(before)) = (of_points, before) {
+                before.velocity.replace(&mut points.velocity, rates.velocity);
+                before.acceleration.replace(&mut points.acceleration, rates.acceleration);
+            }
+            Ok(update::energies(points, &model.materials))
+        })?;
+
+        let reaction = at_held(conditions, &supplied);
+        let mut row = HistoryRow {
+            step: number,
+            load_factor: span.factor_end,
+            newton_iterations: solved.evaluations,
+            residual: solved.residual,
+            linear_iterations: solved.linear_iterations,
+            reactions: reactions(
+                world,
+                &model.grid,
+                &mesh,
+                points,
+                &model.deck.boundaries,
+                conditions,
+                &supplied,
+            ),
+            ..grid_side(world, &mesh, points)
+        };
+        match (&mut self.dynamics, &inertial, &rates) {
+            (Some(dynamics), Some(inertial), Some(rates)) => {
+                let sums = inertial.sums(&mesh, conditions, rates, energies, work);
+                row.time = span.time_end;
+                row.dt = span.time_end - span.time_start;
+                dynamics.book(run, sums, solved.ghost_energy, &mut row)?;
+            }
+            _ => {
+                let sums = world.sum_slice(&[energies.strain, energies.plastic, work]);
+                (row.energy_strain, row.energy_plastic) = (sums[0], sums[1]);
+                (row.work_external, row.energy_ghost) = (sums[2], solved.ghost_energy);
+                self.totals.add(&mut row);
+            }
+        }
+        row.cuts = self.stepping.cuts;
+        Ok(Solved { row, mesh, displacement, reaction, moved_grid })
+    }
+
+    fn undo(&mut self, points: &mut Points<D>) -> bool {
+        let Some(dynamics) = &mut self.dynamics else { return false };
+        dynamics.before.restore(points);
+        true
+    }
+
+    fn refuse(&mut self) -> Answer {
+        if self.stepping.refuse() { Answer::Smaller } else { Answer::Smallest }
+    }
+
+    fn accept(&mut self, _run: &Run<D>, _next: Next) -> Moment {
+        self.stepping.accept()
+    }
+
+    fn completed(&self) -> usize {
+        self.stepping.completed()
+    }
+}
+
+/// The first load step of the deck.
+pub fn first_span(deck: &Deck) -> StepSpan {
+    let factor_end = 1.0 / deck.analysis.steps.unwrap_or(1) as f64;
+    StepSpan { factor_start: 0.0, factor_end, time_start: 0.0, time_end: factor_end }
+}
+
+/// Sums of a quasi-static run so far.
+#[derive(Default)]
+struct Totals {
+    work: f64,
+    ghost: f64,
+}
+
+impl Totals {
+    /// Adds a step's work and Ghost energy; its row then tells those of the run.
+    fn add(&mut self, row: &mut HistoryRow) {
+        self.work += row.work_external;
+        self.ghost += row.energy_ghost;
+        (row.work_external, row.energy_ghost) = (self.work, self.ghost);
+    }
+
+    fn save(&self, state: &mut RunState) {
+        state.set("totals.work", self.work);
+        state.set("totals.ghost", self.ghost);
+    }
+
+    fn restore(&mut self, state: &RunState) -> Result<()> {
+        self.work = state.number("totals.work")?;
+        self.ghost = state.number("totals.ghost")?;
+        Ok(())
+    }
+}
+
+/// External forces of a step, N.
+pub(super) struct Loads<const D: usize> {
+    /// On the points at the start.
+    pub points_start: Vec<[f64; D]>,
+    /// Of the owned degrees of freedom, here and below.
+    pub external_start: Vec<f64>,
+    pub external_end: Vec<f64>,
+}
+
+impl<const D: usize> Loads<D> {
+    /// Collective.
+    fn of_step(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        mesh: &Discretisation<D>,
+        span: StepSpan,
+    ) -> Result<Self> {
+        let points_start = model.point_forces(world, points, span.factor_start, span.time_start)?;
+        let points_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
+        Ok(Loads {
+            external_start: owned_forces(world, mesh, &points_start)?,
+            external_end: owned_forces(world, mesh, &points_end)?,
+            points_start,
+        })
+    }
+}
+
+/// Nodal external force of the owned degrees of freedom. Collective.
+fn owned_forces<const D: usize>(
+    world: &World,
+    mesh: &Discretisation<D>,
+    forces: &[[f64; D]],
+) -> Result<Vec<f64>> {
+    let numbering = &mesh.numbering;
+    let mut nodal = map_forces(numbering, &mesh.influences, forces);
+    numbering.halo.reverse_add(world, &mut nodal, D)?;
+    nodal.truncate(numbering.owned * D);
+    Ok(nodal)
+}
+
+/// Work of loads and moved boundaries over the step, by the trapezoidal rule, this rank's share.
+fn work_of_step<const D: usize>(
+    conditions: &Conditions,
+    numbering: &Numbering,
+    displacement: &[f64],
+    external: [&[f64]; 2],
+    internal: [&[f64]; 2],
+) -> f64 {
+    (0..numbering.owned * D)
+        .map(|dof| {
+            // On a held component the boundary supplies what the loads do not.
+            let side = if conditions.fixed[dof] { internal } else { external };
+            0.5 * (side[0][dof] + side[1][dof]) * displacement[dof]
+        })
+        .sum()
+}

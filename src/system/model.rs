@@ -1,0 +1,63 @@
+//! The deck made computable: grid, partition, materials, penalties and loads of a run.
+
+use crate::deck::Deck;
+use crate::deck::model::Tangent;
+use crate::error::Result;
+use crate::ghost::stencil::Penalty;
+use crate::grid::Grid;
+use crate::loads::manufactured::Manufactured;
+use crate::loads::point_forces;
+use crate::material::Material;
+use crate::parallel::balance::Balance;
+use crate::parallel::{Partition, World};
+use crate::points::Points;
+
+/// What stays the same while points move: the deck made computable.
+pub struct Model<const D: usize> {
+    pub deck: Deck,
+    pub grid: Grid<D>,
+    pub partition: Partition<D>,
+    /// One per body.
+    pub materials: Vec<Material>,
+    /// One per body.
+    pub penalties: Vec<Penalty>,
+    /// Mean stiffness scale of each body, Pa: what Ghost stiffness and penalties are factors of.
+    pub stiffness: Vec<f64>,
+    /// Whether the tangent of every material is symmetric in every state.
+    pub symmetric: bool,
+    /// The field of a `manufactured` load with its derivatives.
+    pub manufactured: Option<Manufactured>,
+    pub balance: Balance,
+}
+
+impl<const D: usize> Model<D> {
+    /// Whether every body has Ghost stiffness.
+    pub fn stabilised(&self) -> bool {
+        self.penalties.iter().all(|penalty| penalty.stiffness > 0.0)
+    }
+
+    /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the
+    /// deck does not ask for the general path.
+    pub fn symmetric(&self) -> bool {
+        self.deck.analysis.tangent == Tangent::Auto && self.symmetric
+    }
+
+    /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.
+    pub fn point_forces(
+        &self,
+        world: &World,
+        points: &Points<D>,
+        load_factor: f64,
+        time: f64,
+    ) -> Result<Vec<[f64; D]>> {
+        world.fail_together(point_forces::point_forces(
+            points,
+            &self.materials,
+            &self.deck.loads,
+            self.manufactured.as_ref(),
+            self.deck.analysis.kind,
+            load_factor,
+            time,
+        ))
+    }
+}
