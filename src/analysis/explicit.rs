@@ -4,12 +4,12 @@ use crate::deck::model::{Basis, DomainUpdate, Mass};
 use crate::error::Result;
 use crate::output::restart::run_state::RunState;
 use crate::points::Points;
+use crate::points::Snapshot;
 use crate::record::context::Run;
 use crate::record::ledger::{Entry, Ledger};
 use crate::record::step::{Moment, Solved};
 use crate::system::model::Model;
 use crate::transfer::refusal::{Cause, Halt};
-use crate::transfer::undo::Snapshot;
 
 use super::explicit_step::advance;
 use super::time_loop::{Analysis, Answer, Manner, Next};

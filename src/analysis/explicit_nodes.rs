@@ -14,6 +14,7 @@ use crate::tensor::Square;
 
 use crate::mass::grid_mass::{GridMass, Inverse, require_mass};
 use crate::mass::light_nodes::LightNodes;
+use crate::points::Snapshot;
 use crate::record::clock::Clock;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
@@ -21,7 +22,6 @@ use crate::transfer::mapping::{self, Pushed};
 use crate::transfer::nodal_sums::{over_points, to_points};
 use crate::transfer::refusal::Halt;
 use crate::transfer::transport::Carrier;
-use crate::transfer::undo::Snapshot;
 use crate::transfer::update::{self, PointEnergies};
 
 /// A step's equations at the nodes.

@@ -14,6 +14,7 @@ use crate::tensor::Square;
 use super::explicit_nodes::{Forces, Motion, Nodes};
 use crate::mass::grid_mass::GridMass;
 use crate::mass::light_nodes::LightNodes;
+use crate::points::Snapshot;
 use crate::record::context::Run;
 use crate::record::ledger::StepSums;
 use crate::record::reactions::{at_held, reactions};
@@ -23,7 +24,6 @@ use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::mapping::{self, Pushed};
 use crate::transfer::refusal::Halt;
 use crate::transfer::transport::{self, Carrier};
-use crate::transfer::undo::Snapshot;
 use crate::transfer::update::{self, Increments};
 
 /// One time step; the points end at their new state, not yet migrated, and `before` holds what was

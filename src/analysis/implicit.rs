@@ -5,23 +5,21 @@
 use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
 use crate::error::Result;
-use crate::loads::point_forces::map_forces;
 use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
-use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::record::context::Run;
 use crate::record::reactions::{at_held, reactions};
 use crate::record::step::{Moment, Solved, grid_side};
 use crate::system::conditions::{Conditions, StepSpan};
-use crate::system::model::Model;
 use crate::system::numbering::Numbering;
 use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::refusal::Halt;
 use crate::transfer::update;
 
 use super::equilibrium::StepEquations;
+use super::external::Loads;
 use super::inertial::{Dynamics, InertialStep};
 use super::load_steps::Stepping;
 use super::newton::{self, Carried};
@@ -238,47 +236,6 @@ impl Totals {
         self.ghost = state.number("totals.ghost")?;
         Ok(())
     }
-}
-
-/// External forces of a step, N.
-pub(super) struct Loads<const D: usize> {
-    /// On the points at the start.
-    pub points_start: Vec<[f64; D]>,
-    /// Of the owned degrees of freedom, here and below.
-    pub external_start: Vec<f64>,
-    pub external_end: Vec<f64>,
-}
-
-impl<const D: usize> Loads<D> {
-    /// Collective.
-    fn of_step(
-        world: &World,
-        model: &Model<D>,
-        points: &Points<D>,
-        mesh: &Discretisation<D>,
-        span: StepSpan,
-    ) -> Result<Self> {
-        let points_start = model.point_forces(world, points, span.factor_start, span.time_start)?;
-        let points_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
-        Ok(Loads {
-            external_start: owned_forces(world, mesh, &points_start)?,
-            external_end: owned_forces(world, mesh, &points_end)?,
-            points_start,
-        })
-    }
-}
-
-/// Nodal external force of the owned degrees of freedom. Collective.
-fn owned_forces<const D: usize>(
-    world: &World,
-    mesh: &Discretisation<D>,
-    forces: &[[f64; D]],
-) -> Result<Vec<f64>> {
-    let numbering = &mesh.numbering;
-    let mut nodal = map_forces(numbering, &mesh.influences, forces);
-    numbering.halo.reverse_add(world, &mut nodal, D)?;
-    nodal.truncate(numbering.owned * D);
-    Ok(nodal)
 }
 
 /// Work of loads and moved boundaries over the step, by the trapezoidal rule, this rank's share.

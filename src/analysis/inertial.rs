@@ -18,6 +18,7 @@ use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::points::Snapshot;
 use crate::record::context::Run;
 use crate::record::ledger::{Entry, Ledger, StepSums};
 use crate::record::step::Moment;
@@ -28,10 +29,9 @@ use crate::system::terms::linear::Inertia;
 use crate::system::terms::stress::StepPoints;
 use crate::transfer::mapping;
 use crate::transfer::refusal::Halt;
-use crate::transfer::undo::Snapshot;
 use crate::transfer::update::PointEnergies;
 
-use super::implicit::Loads;
+use super::external::Loads;
 use super::newmark::{Newmark, PointRates, Rates};
 use super::time_steps::ledger_at_start;
 

@@ -20,6 +20,7 @@ pub mod equilibrium;
 pub mod explicit;
 pub mod explicit_nodes;
 pub mod explicit_step;
+mod external;
 pub mod extremes;
 pub mod failure;
 pub mod implicit;

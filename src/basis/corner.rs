@@ -7,7 +7,7 @@
 //! keep partition of unity and linear fields exact.
 
 use crate::error::{Error, Result};
-use crate::grid::locate::REACH;
+use crate::grid::bins::REACH;
 use crate::grid::{Grid, Values};
 use crate::points::Points;
 

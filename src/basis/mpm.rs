@@ -6,7 +6,7 @@
 
 use super::{Influences, Row, outside, row};
 use crate::error::Result;
-use crate::grid::locate::REACH;
+use crate::grid::bins::REACH;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::grid::{FacePair, Grid};
 use crate::parallel::{Partition, World, exchange};
 
-use super::faces::{BoundaryFace, Cell, Cells};
+use super::cells::{BoundaryFace, Cell, Cells};
 
 /// The ties whose lower cell this rank owns, in ascending order. `boundary` lists its boundary
 /// cells; `cells` knows all cells with a face at them. Collective.

@@ -13,8 +13,8 @@ use std::collections::BTreeMap;
 
 use crate::error::{Error, Result};
 
+use super::bins::Bins;
 use super::element;
-use super::locate::Bins;
 use super::mesh::{Mesh, smallest_edge};
 use super::topology::{OUTSIDE, ThirdCell, Topology};
 use crate::deck::model::Element;

@@ -1,9 +1,9 @@
 //! The grid's own basis S_i(x) and its gradient at a place, on either grid (Ghost §2.5).
 
+use super::bins::{EDGE_TOLERANCE, REACH};
 use super::element;
 use super::inverse_map::{inverse_map, inverse_map_from};
 use super::lattice::{CELL_CORNERS, LINE_TOLERANCE};
-use super::locate::{EDGE_TOLERANCE, REACH};
 use super::{Grid, Lattice, Mesh};
 
 /// The basis's values at one place: a cell and its nodes in cell order.

@@ -17,8 +17,8 @@ use std::collections::BTreeMap;
 use crate::error::{Error, Result};
 
 use super::FacePair;
+use super::bins::Bins;
 use super::element;
-use super::locate::Bins;
 use super::quadrature::{self, SubCell};
 use super::topology::{OUTSIDE, Topology};
 use crate::deck::model::Element;

@@ -10,10 +10,11 @@
 //! | `element` | shape functions; inverse maps | `element.rs`, `inverse_map.rs` |
 //! | `points_per_cell`, `gauss` on a mesh | sub-cells and Gauss points | `quadrature.rs` |
 //!
-//! Behind them: `topology.rs` (neighbours), `check.rs` (what a mesh must satisfy), `locate.rs`
-//! (bins), `interpolate.rs` (the basis at a place), `face.rs` ([`FaceJump`] for Ghost).
+//! Behind them: `topology.rs` (neighbours), `check.rs` (what a mesh must satisfy), `bins.rs`
+//! and `locate.rs` (which cell holds a place), `interpolate.rs` (the basis at a place), `face.rs` ([`FaceJump`] for Ghost).
 //! Node and cell numbers are global `usize` values, the same on every rank.
 
+pub mod bins;
 pub mod check;
 pub mod element;
 pub mod face;
@@ -109,7 +110,7 @@ impl<const D: usize> Grid<D> {
 
     /// The cell that holds `x`, or `None` outside the grid. A point on a shared face belongs to
     /// the upper cell on a lattice (half-open cells; the grid's own upper edge is closed) and
-    /// to the lowest-numbered cell on a mesh. A mesh holds points up to [`locate::REACH`] of a
+    /// to the lowest-numbered cell on a mesh. A mesh holds points up to [`bins::REACH`] of a
     /// cell outside it: a polygon that turns inside a round outline cuts other chords.
     pub fn locate(&self, x: &[f64; D]) -> Option<usize> {
         self.locate_near(x, None)
@@ -120,7 +121,7 @@ impl<const D: usize> Grid<D> {
     pub fn locate_near(&self, x: &[f64; D], hint: Option<usize>) -> Option<usize> {
         match self {
             Grid::Lattice(lattice) => lattice.locate(x),
-            Grid::Mesh(mesh) => mesh.locate_near(x, locate::REACH, hint).map(|found| found.0),
+            Grid::Mesh(mesh) => mesh.locate_near(x, bins::REACH, hint).map(|found| found.0),
         }
     }
 

@@ -3,6 +3,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `mod.rs` | the fields, and how a point is packed, moved and reordered |
+//! | `former.rs` | what a step overwrites, to go back to where it fails |
 //! | `gather.rs` | a field's values in another order |
 //! | `named.rs` | words that a body's material asks for, by name |
 //! | `seed.rs` | deck bodies -> points |
@@ -14,6 +15,7 @@
 
 pub mod coverage;
 pub mod file;
+pub mod former;
 mod gather;
 mod named;
 pub mod overlap;
@@ -23,6 +25,7 @@ pub mod share;
 pub mod sort;
 mod sub_cells;
 
+use former::Former;
 use gather::{Gather, Moves};
 use nalgebra::Matrix3;
 pub use named::Named;
@@ -33,7 +36,7 @@ use crate::tensor::Spectrum;
 use crate::tensor::spectral::ln_1p;
 
 /// Declares the struct of arrays and everything that must treat each field alike: packing for
-/// migration and checkpoints, reordering, removal. A field is an array of `f64` words per point.
+/// migration and checkpoints, reordering, removal, undoing a step. A field is an array of `f64` words per point.
 macro_rules! point_fields {
     ($( $(#[$doc:meta])* $name:ident : $type:ty, $words:expr );* $(;)?) => {
         /// One rank's material points. `D` is the dimension of space; stress and deformation
@@ -153,6 +156,28 @@ macro_rules! point_fields {
                     } )*
                     _ => false,
                 }
+            }
+        }
+
+        /// The arrays of [`Points`] that a step has overwritten so far.
+        #[derive(Default)]
+        pub struct Snapshot<const D: usize> {
+            $( pub $name: Former<$type>, )*
+            /// State variables, row by row.
+            pub state: Former<f64>,
+        }
+
+        impl<const D: usize> Snapshot<D> {
+            /// A new step begins: what the arrays hold is no longer wanted.
+            pub fn begin(&mut self) {
+                $( self.$name.forget(); )*
+                self.state.forget();
+            }
+
+            /// The points as they were when the step began; they have not been reordered since.
+            pub fn restore(&mut self, points: &mut Points<D>) {
+                $( self.$name.give_back(&mut points.$name); )*
+                self.state.give_back(&mut points.state.values);
             }
         }
     };
@@ -358,6 +383,36 @@ mod tests {
             }
             points.shed(Basis::Mpm);
             assert!(points.corners.is_empty());
+        }
+    }
+
+    #[test]
+    fn what_a_step_overwrote_comes_back() {
+        let mut points = Points::<2>::of_basis(Basis::Gimp);
+        for k in 0..3 {
+            points.push_unstrained(k, 0, [k as f64, 0.5], 1.0, 2.0, [0.5; 2]);
+        }
+        let mut before = Snapshot::default();
+        // The second step has more points, the third fewer.
+        for count in [3, 4, 2] {
+            points.truncate(count);
+            while points.len() < count {
+                points.push_unstrained(7, 0, [9.0, 0.5], 1.0, 2.0, [0.5; 2]);
+            }
+            before.begin();
+            let (position, velocity) = (points.position.clone(), points.velocity.clone());
+            before.position.set_aside(&mut points.position);
+            for (new, old) in points.position.iter_mut().zip(before.position.values()) {
+                *new = old.map(|x| x + 1.0);
+            }
+            assert_eq!(points.position[1], position[1].map(|x| x + 1.0));
+            before.velocity.replace(&mut points.velocity, vec![[4.0; 2]; count]);
+            before.restore(&mut points);
+            assert_eq!((&points.position, &points.velocity), (&position, &velocity));
+            // A step that fails before it overwrites anything leaves the points alone.
+            before.begin();
+            before.restore(&mut points);
+            assert_eq!((&points.position, &points.velocity), (&position, &velocity));
         }
     }
 }

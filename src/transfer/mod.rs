@@ -7,7 +7,6 @@
 //! | points at the end of a step | `update.rs` | Lagrangian eq. 31-39 |
 //! | why a step cannot be applied | `refusal.rs` | |
 //! | what carries the points | `transport.rs` | Ghost eq. 9 |
-//! | back to a step's start where it fails | `undo.rs` | |
 //! | the mesh between steps | `mesh_motion.rs` | Rotation §2 (viii) |
 
 pub mod mapping;
@@ -15,5 +14,4 @@ pub mod mesh_motion;
 pub mod nodal_sums;
 pub mod refusal;
 pub mod transport;
-pub mod undo;
 pub mod update;

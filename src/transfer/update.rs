@@ -22,7 +22,8 @@ use crate::system::terms::stress::{StepPoints, displacement_gradient};
 use crate::tensor::dense;
 
 use super::refusal::{Cause, Refusal};
-use super::undo::{Former, Snapshot};
+use crate::points::Snapshot;
+use crate::points::former::Former;
 
 /// Increments at each point of this rank, computed but not yet applied.
 pub struct Increments<const D: usize> {

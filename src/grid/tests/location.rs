@@ -1,8 +1,8 @@
 //! Point location against a search through all cells, on edges, outside, and after motion.
 
 use super::super::Grid;
+use super::super::bins::{EDGE_TOLERANCE, REACH};
 use super::super::inverse_map::inverse_map;
-use super::super::locate::{EDGE_TOLERANCE, REACH};
 use super::*;
 use crate::deck::model::MeshMotion;
 

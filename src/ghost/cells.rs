@@ -1,0 +1,90 @@
+//! What is known of the cells around a body's boundary: own ones and those of other ranks.
+
+use rustc_hash::FxHashMap;
+
+use crate::grid::FacePair;
+
+/// A face, or a tie of two simplices as if they shared one, with its bodies, one bit each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct BoundaryFace {
+    pub pair: FacePair,
+    pub bodies: u64,
+}
+
+/// What a neighbour rank must know of a cell.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Cell {
+    /// Bodies that populate the cell, one bit each.
+    pub populated: u64,
+    /// Bodies for which it is a boundary cell.
+    pub boundary: u64,
+    /// Bodies for which it is an empty simplex between two populated ones.
+    pub bridge: u64,
+}
+
+impl Cell {
+    /// What another rank is told of the cell.
+    pub fn record(self, cell: u64) -> [u64; 4] {
+        [cell, self.populated, self.boundary, self.bridge]
+    }
+}
+
+/// The cells of this rank, in their order, and those of others that are known.
+pub(crate) struct Cells {
+    first: usize,
+    /// Place in `own` of the cells from `first` on; empty where they lie far apart.
+    table: Vec<u32>,
+    pub numbers: Vec<usize>,
+    /// The populated ones.
+    pub own: Vec<Cell>,
+    /// Those of other ranks, and empty ones of this rank.
+    pub others: FxHashMap<usize, Cell>,
+}
+
+impl Cells {
+    pub fn new(populated: &[(usize, u64)]) -> Self {
+        let first = populated.first().map_or(0, |own| own.0);
+        let range = populated.last().map_or(0, |own| own.0 + 1 - first);
+        let mut table = Vec::new();
+        if range / 16 <= populated.len() {
+            table.resize(range, u32::MAX);
+            for (at, (cell, _)) in populated.iter().enumerate() {
+                table[cell - first] = at as u32;
+            }
+        }
+        let own =
+            populated.iter().map(|own| Cell { populated: own.1, ..Cell::default() }).collect();
+        let numbers = populated.iter().map(|own| own.0).collect();
+        Cells { first, table, numbers, own, others: FxHashMap::default() }
+    }
+
+    #[inline]
+    pub fn get(&self, cell: usize) -> Option<&Cell> {
+        self.place(cell).map(|at| &self.own[at]).or_else(|| self.others.get(&cell))
+    }
+
+    pub fn entry(&mut self, cell: usize) -> &mut Cell {
+        match self.place(cell) {
+            Some(at) => &mut self.own[at],
+            None => self.others.entry(cell).or_default(),
+        }
+    }
+
+    /// Takes in the [`Cell::record`]s of cells of other ranks.
+    pub fn learn(&mut self, records: &[u64]) {
+        for record in records.chunks_exact(4) {
+            let state = Cell { populated: record[1], boundary: record[2], bridge: record[3] };
+            self.others.insert(record[0] as usize, state);
+        }
+    }
+
+    /// Index of a populated cell of this rank.
+    #[inline]
+    fn place(&self, cell: usize) -> Option<usize> {
+        if self.table.is_empty() {
+            return self.numbers.binary_search(&cell).ok();
+        }
+        let place = self.table.get(cell.wrapping_sub(self.first));
+        place.filter(|&&at| at != u32::MAX).map(|&at| at as usize)
+    }
+}
