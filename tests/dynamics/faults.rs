@@ -227,20 +227,21 @@ fn a_body_without_points_is_named() {
     assert!(outcome.files().is_empty(), "{:?}", outcome.files());
 }
 
-/// A row of points on a grid line gives the nodes across the cell gradients but no mass.
+/// A row of points on a grid line gives the nodes across the cell gradients but no mass. With a lumped
+/// mass such nodes move along with the points (`exactness.rs`); a consistent one without Ghost has no
+/// answer for them.
 #[test]
 fn a_node_that_is_pushed_but_has_no_mass_is_named() {
-    let row = blocks(&[r#"
+    let outcome = blocks(&[r#"
 shape = { box = { min = [2, 2.9], max = [4, 3.1] } }
 lattice = { spacing = 0.5, offset = [2.25, 3.0] }
 velocity = ["X", "0"]"#])
     .set("analysis.steps=10")
-    .set("analysis.duration=0.01");
-    for mass in ["lumped", "consistent"] {
-        let outcome = row.clone().set(format!("method.mass=\"{mass}\"")).attempt();
-        assert_says(&outcome, 1, &["step 2", "node at [", "no mass"]);
-        assert_keeps(outcome, 1);
-    }
+    .set("analysis.duration=0.01")
+    .set("method.mass=\"consistent\"")
+    .attempt();
+    assert_says(&outcome, 1, &["step 2", "node at [", "no mass"]);
+    assert_keeps(outcome, 1);
 }
 
 #[test]
