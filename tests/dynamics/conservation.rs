@@ -60,14 +60,14 @@ name = "left"
 material = "soft"
 density = 10
 shape = { @shape = { centre = @left, radius = 1.43 } }
-points_per_cell = @per_cell
+lattice = @lattice
 velocity = @turning
 [[body]]
 name = "right"
 material = "soft"
 density = 10
 shape = { @shape = { centre = @right, radius = 1.21 } }
-points_per_cell = @per_cell
+lattice = @lattice
 velocity = @coming
 [output]
 every = 100000
@@ -103,7 +103,14 @@ impl Tumble {
             ("@shape", choose("disc", "ball")),
             ("@left", choose("[-0.13, 0.21]", "[-0.13, 0.21, 0.17]")),
             ("@right", format!("[{gap:?}, 0.87{}]", choose("", ", -0.38"))),
-            ("@per_cell", choose("[3, 3]", "[2, 2, 2]")),
+            // Points of equal mass, so that a body's mean velocity is that of its points.
+            (
+                "@lattice",
+                choose(
+                    "{ spacing = 0.3333333333333333, offset = [0.16666666666666666, 0.16666666666666666] }",
+                    "{ spacing = 0.5, offset = [0.25, 0.25, 0.25] }",
+                ),
+            ),
             (
                 "@turning",
                 choose(
