@@ -7,6 +7,7 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 use crate::error::{Error, Result};
+use crate::record::checkpointing::Restart;
 
 /// The command line, read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
@@ -38,13 +39,6 @@ pub enum Voice {
     Normal,
     /// Every step, here and in the log.
     Verbose,
-}
-
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Restart {
-    /// The newest checkpoint in the results directory.
-    Last,
-    File(PathBuf),
 }
 
 const USAGE: &str = "mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out DIR] \

@@ -10,11 +10,11 @@
 //! | the algorithms: load steps, time steps, Newton's method (Ghost §2.3, 2.4; Lagrangian §6.3, 6.5) | [`analysis`] |
 //! | what a run tells | [`record`] |
 //! | results on disk and on the terminal | [`output`] |
-//! | a step's equations (Lagrangian eq. 27-29) | [`system`] |
-//! | external forces | [`loads`] |
 //! | points to nodes and back (Ghost eq. 6, 8-10; Lagrangian eq. 31-39) | [`transfer`] |
 //! | mass of the nodes and its solve (Ghost eq. 7, 15, 24) | [`mass`] |
 //! | (d) multigrid's levels | [`amg`] |
+//! | a step's equations and their terms (Lagrangian eq. 27-29) | [`system`] |
+//! | external forces | [`loads`] |
 //! | Ghost faces and their matrix (Ghost §3, §4) | [`ghost`] |
 //! | who owns what, migration | [`parallel`] |
 //! | strains, stress measures and tangents in three frames (Lagrangian §3-5, App. A) | [`mechanics`] |

@@ -23,7 +23,7 @@ use mpm_par::system::model::Model;
 use mpm_par::system::plain;
 use mpm_par::system::scatter::{self, BlockMatrix};
 use mpm_par::system::step_system::Discretisation;
-use mpm_par::system::terms::linear::ghost_matrix;
+use mpm_par::system::terms::ghost::ghost_matrix;
 use mpm_par::system::terms::stress;
 
 /// A block of material whose points lie off the middles of the cells, `per_cell` of them a side.
@@ -219,7 +219,7 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
         conditions: &conditions,
         left_out: &left_out,
         external_owned: external,
-        inertia: None,
+        terms: Vec::new(),
     };
     let mut problem = Equilibrium::new(world, grid, &mesh, step, equations, settings)?;
     let mut matrix = solver::matrix(world, &model, numbering, pattern)?;

@@ -24,7 +24,7 @@ use crate::record::recorder::Ending;
 use crate::record::step::{Moment, grid_side};
 use crate::system::model::Model;
 use crate::system::step_system::{Coupling, Discretisation};
-use crate::system::terms::linear::ghost_matrix;
+use crate::system::terms::ghost::ghost_matrix;
 use crate::transfer::mapping;
 
 /// Moves the bodies in equal increments and records one row for each position.

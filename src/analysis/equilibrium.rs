@@ -23,12 +23,14 @@ use crate::system::in_place::{InPlace, Layout};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
-use crate::system::terms::stress::{self, Health, StepPoints};
+use crate::system::terms::Term;
+use crate::system::terms::ghost::Ghost;
+use crate::system::terms::stress::{StepPoints, Stress};
+use crate::system::terms::term::{At, Health, Part};
 
 use super::convergence::{converges_next, hardly_falls};
 use super::round_off;
 use crate::system::step_system::Discretisation;
-use crate::system::terms::linear::{GhostTerm, Inertia};
 
 /// Limits and choices of the iteration.
 #[derive(Debug, Clone, Copy)]
@@ -43,13 +45,14 @@ pub struct NewtonSettings {
 }
 
 /// What a step's equations consist of beside the stress of its points.
-pub struct StepEquations<'a> {
+pub struct StepEquations<'a, const D: usize> {
     pub conditions: &'a Conditions,
     /// Local nodes that carry no equation of their own (`drop_below`).
     pub left_out: &'a [bool],
     /// Right-hand side of the owned degrees of freedom, N.
     pub external_owned: Vec<f64>,
-    pub inertia: Option<Inertia>,
+    /// Those that follow stress and Ghost stiffness, in their order.
+    pub terms: Vec<Box<dyn Term<D> + 'a>>,
 }
 
 /// One step's equations. Vectors named `*_owned` hold the owned degrees of freedom, the others
@@ -59,15 +62,13 @@ pub struct Equilibrium<'a, const D: usize> {
     grid: &'a Grid<D>,
     numbering: &'a Numbering,
     pattern: &'a Pattern,
-    step: StepPoints<'a, D>,
     settings: NewtonSettings,
     /// Fixed by a condition, or left out (`drop_below`).
     held: Held,
     increment: Vec<f64>,
     external_owned: Vec<f64>,
-    /// K_G: constant over the step.
-    ghost: Option<GhostTerm>,
-    inertia: Option<Inertia>,
+    /// What is summed, in this order.
+    terms: Vec<Box<dyn Term<D> + 'a>>,
     layout: Layout<D>,
     /// Rows that the solver's array cannot take whole.
     beside: Vec<f64>,
@@ -113,10 +114,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         grid: &'a Grid<D>,
         mesh: &'a Discretisation<D>,
         step: StepPoints<'a, D>,
-        equations: StepEquations<'_>,
+        equations: StepEquations<'a, D>,
         settings: NewtonSettings,
     ) -> Result<Self> {
-        let StepEquations { conditions, left_out, external_owned, inertia } = equations;
+        let StepEquations { conditions, left_out, external_owned, terms: further } = equations;
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let mut held = conditions.fixed.clone();
         let increment = conditions.increment.clone();
@@ -128,20 +129,25 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let layout = Layout::<D>::new(numbering, pattern);
         let held =
             Held::new::<D>(numbering, pattern, held, &conditions.fixed, |row| layout.start(row));
-        let ghost = GhostTerm::new(world, mesh)?;
+        // The terms of a step: a new one is a line here.
+        let (frame, symmetric) = (settings.frame, settings.symmetric);
+        let mut terms: Vec<Box<dyn Term<D> + 'a>> =
+            vec![Box::new(Stress { step, frame, symmetric })];
+        if let Some(ghost) = Ghost::new(world, mesh)? {
+            terms.push(Box::new(ghost));
+        }
+        terms.extend(further);
         let beside = vec![0.0; layout.len_beside()];
         Ok(Equilibrium {
             world,
             grid,
             numbering,
             pattern,
-            step,
             settings,
             held,
             increment,
             external_owned,
-            ghost,
-            inertia,
+            terms,
             layout,
             beside,
             tangent: Tangent::Stale,
@@ -219,12 +225,20 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         }
     }
 
-    /// Energy of the Ghost term, u K_G u / 2, this rank's share, J.
+    /// Energy that the terms hold and the points do not: u K_G u / 2 of the Ghost faces, this rank's
+    /// share, J.
     pub fn ghost_energy(&self) -> f64 {
-        let Some(ghost) = &self.ghost else { return 0.0 };
-        let mut force = vec![0.0; self.numbering.owned * D];
-        ghost.add_product::<D>(self.pattern, &self.displacement, &mut force);
-        0.5 * force.iter().zip(&self.displacement).map(|(f, u)| f * u).sum::<f64>()
+        self.terms.iter().map(|term| term.energy(self.at())).sum()
+    }
+
+    /// Whether the tangents of all terms equal their transposed.
+    pub fn symmetric(&self) -> bool {
+        self.terms.iter().all(|term| term.symmetric())
+    }
+
+    /// The last iterate.
+    fn at(&self) -> At<'_> {
+        At { pattern: self.pattern, displacement: &self.displacement }
     }
 
     fn load_displacement(&mut self, x: &[f64]) -> Result<()> {
@@ -238,26 +252,28 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let numbering = self.numbering;
         let mut force = vec![0.0; numbering.len() * D];
         let mut storage = matrix.map(Matrix::storage).transpose()?;
-        let base = self.ghost.as_ref().map(|ghost| (&ghost.matrix, &ghost.reaches[..]));
+        let base = self.terms.iter().find_map(|term| term.first_in_rows());
         let mut rows = match &mut storage {
             Some((main, _)) => Some(InPlace::new(&self.layout, main, &mut self.beside, base)?),
             None => None,
         };
         self.tangent = Tangent::Stale;
-        let (world, pattern, step) = (self.world, self.pattern, self.step);
-        let (frame, displacement) = (self.settings.frame, &self.displacement[..]);
-        let add = |groups: &[_], force: &mut [f64], rows: Option<&mut InPlace<'_, D>>| {
-            stress::assemble_groups(step, groups, frame, pattern, displacement, force, rows)
+        let (world, pattern, terms) = (self.world, self.pattern, &self.terms);
+        let at = At { pattern, displacement: &self.displacement };
+        let add = |part: Part, force: &mut [f64], mut rows: Option<&mut InPlace<'_, D>>| {
+            terms.iter().fold(Health::default(), |health, term| {
+                health.and(term.add_shares(part, at, force, rows.as_deref_mut()))
+            })
         };
         // What other ranks wait for comes first, and travels while the rest is added up.
-        let reaching = add(&step.border.reaching, &mut force, rows.as_mut());
+        let reaching = add(Part::Reaching, &mut force, rows.as_mut());
         if let Some(rows) = &mut rows {
             rows.finish(pattern, numbering.owned);
         }
         let inner = numbering.halo.reverse_add_while(world, [&mut force[..]], D, |[force]| {
-            let Some(rows) = &mut rows else { return add(&step.border.inner, force, None) };
+            let Some(rows) = &mut rows else { return add(Part::Inner, force, None) };
             scatter::reduce_while(world, pattern, rows, |rows| {
-                let health = add(&step.border.inner, force, Some(&mut *rows));
+                let health = add(Part::Inner, force, Some(&mut *rows));
                 rows.finish(pattern, 0);
                 health
             })
@@ -270,16 +286,13 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             return Ok(false);
         }
         force.truncate(numbering.owned * D);
-        if let Some(ghost) = &self.ghost {
-            ghost.add_product::<D>(self.pattern, &self.displacement, &mut force);
-        }
-        if let Some(inertia) = &self.inertia {
-            inertia.add_force::<D>(self.pattern, &self.displacement, &mut force);
+        for term in terms {
+            term.add_force(at, &mut force);
         }
         self.internal_owned = force;
         let Some(mut rows) = rows else { return Ok(true) };
-        if let Some(inertia) = &self.inertia {
-            inertia.join(self.pattern, numbering.owned, &mut rows);
+        for term in terms {
+            term.add_tangent(pattern, numbering.owned, &mut rows);
         }
         if self.diagonal_scale == 0.0 {
             (self.diagonal_scale, self.diagonal_largest) = free_diagonal(
@@ -340,16 +353,16 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             return Ok(false);
         }
         let (numbering, pattern) = (self.numbering, self.pattern);
-        let mut size = round_off::sizes(self.step, &self.displacement, numbering.len());
+        let mut size = vec![0.0; numbering.len()];
+        for term in &self.terms {
+            term.add_share_sizes(self.at(), &mut size);
+        }
         numbering.halo.reverse_add(self.world, &mut size, 1)?;
         size.truncate(numbering.owned);
         let norm = |u: &[f64]| u.iter().map(|u| u * u).sum::<f64>().sqrt();
         let moved: Vec<f64> = self.displacement.chunks_exact(D).map(norm).collect();
-        if let Some(ghost) = &self.ghost {
-            ghost.add_size(pattern, &moved, &mut size);
-        }
-        if let Some(inertia) = &self.inertia {
-            inertia.add_size(pattern, &moved, &mut size);
+        for term in &self.terms {
+            term.add_sizes(pattern, &moved, &mut size);
         }
         let explained = self.counted().all(|dof| {
             let action = self.external_owned[dof] + self.reaction_owned[dof];
@@ -479,7 +492,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
 
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         self.with_rows(matrix, |rows| {
-            let symmetric = self.settings.symmetric;
+            let symmetric = self.symmetric();
             amg::of_system(self.world, self.grid, self.numbering, rows, symmetric)
         })
     }
@@ -492,7 +505,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     ) -> Result<()> {
         self.with_rows(matrix, |rows| {
             amg::fill::<_, D>(rows, exact);
-            if self.settings.symmetric {
+            if self.symmetric() {
                 exact.round_into(finest);
                 return Ok(());
             }

@@ -103,15 +103,15 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             None => None,
         };
         let Run { clock, .. } = &mut *run;
-        let (driving, inertia) = clock.time(Phase::Assemble, || {
+        let (driving, terms) = clock.time(Phase::Assemble, || {
             Ok(match &inertial {
                 Some(inertial) => inertial.equations(&mesh, &loads),
-                None => (loads.external_end.clone(), None),
+                None => (loads.external_end.clone(), Vec::new()),
             })
         })?;
         let (conditions, left_out) = (&conditions, &left_out[..]);
         let equations =
-            StepEquations { conditions, left_out, external_owned: driving.clone(), inertia };
+            StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
         let solved = newton::solve(run, &mesh, equations, &mut self.trials, number)?;
         let displacement = solved.displacement;
 

@@ -25,7 +25,8 @@ use crate::record::step::Moment;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
-use crate::system::terms::linear::Inertia;
+use crate::system::terms::Term;
+use crate::system::terms::inertia::Inertia;
 use crate::system::terms::stress::StepPoints;
 use crate::transfer::mapping;
 use crate::transfer::refusal::Halt;
@@ -137,7 +138,7 @@ impl InertialStep {
         &self,
         mesh: &Discretisation<D>,
         loads: &Loads<D>,
-    ) -> (Vec<f64>, Option<Inertia>) {
+    ) -> (Vec<f64>, Vec<Box<dyn Term<D>>>) {
         let newmark = &self.newmark;
         let mut driving = self.mass.multiply(mesh, &newmark.predictor(&self.start));
         let share = 1.0 + newmark.alpha;
@@ -145,7 +146,7 @@ impl InertialStep {
             *force += share * loads.external_end[dof] - newmark.alpha * self.balance_start[dof];
         }
         let matrix = self.mass.scaled(mesh, newmark.stiffness());
-        (driving, Some(Inertia { share, matrix }))
+        (driving, vec![Box::new(Inertia { share, matrix })])
     }
 
     /// What the boundaries supply in the mean of the step, and at both of its ends; `at_end`: what

@@ -52,7 +52,7 @@ pub fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
 pub fn solve<const D: usize>(
     run: &mut Run<D>,
     mesh: &Discretisation<D>,
-    equations: StepEquations<'_>,
+    equations: StepEquations<'_, D>,
     trials: &mut Trials,
     number: usize,
 ) -> std::result::Result<Converged, Halt> {
@@ -162,7 +162,7 @@ fn solve_robustly<const D: usize>(
 ) -> Result<(NewtonOutcome, Option<String>)> {
     let Size { equations, stabilised, null_pivots } = size;
     let linear = Linear::of::<D>(equations, stabilised, trials)?;
-    let (most, symmetric) = (problem.settings().max_evaluations, problem.settings().symmetric);
+    let (most, symmetric) = (problem.settings().max_evaluations, problem.symmetric());
     let mut snes = solver::newton(world, linear, symmetric, null_pivots, most)?;
     let outcome = snes.solve(problem, matrix, solution)?;
     trials.note(linear, !outcome.converged);

@@ -10,7 +10,7 @@ use crate::parallel::World;
 use crate::system::scatter::BlockMatrix;
 
 use crate::system::step_system::Discretisation;
-use crate::system::terms::linear::ghost_matrix;
+use crate::system::terms::ghost::ghost_matrix;
 use crate::system::terms::stress::StepPoints;
 use crate::transfer::nodal_sums::over_points;
 

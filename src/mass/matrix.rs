@@ -8,9 +8,8 @@ use std::ops::Range;
 use crate::error::Result;
 use crate::parallel::World;
 
-use crate::system::kernel::add_runs;
 use crate::system::pattern::Pattern;
-use crate::system::scatter::BlockMatrix;
+use crate::system::scatter::{BlockMatrix, add_support};
 use crate::system::terms::stress::StepPoints;
 
 /// Row sums at the local nodes; ghost shares are not yet sent to their owners. kg
@@ -56,23 +55,6 @@ pub fn consistent<const D: usize>(
     }
     matrix.reduce(world, pattern);
     Ok(matrix)
-}
-
-/// Adds a dense matrix over the nodes of a support of the pattern, row by row.
-pub fn add_support(matrix: &mut BlockMatrix<1>, pattern: &Pattern, support: usize, block: &[f64]) {
-    let nodes = pattern.supports.list(support);
-    let place = pattern.places.of(support);
-    let width = nodes.len() / place.run;
-    let rows = block.chunks_exact(nodes.len()).zip(place.positions.chunks_exact(width));
-    for (&node, (source, positions)) in nodes.iter().zip(rows) {
-        let row = pattern.row_of[node as usize] as usize;
-        let target = &mut matrix.values[pattern.offsets[row]..pattern.offsets[row + 1]];
-        match place.run {
-            3 => add_runs::<1, 3>(target, source, positions),
-            2 => add_runs::<1, 2>(target, source, positions),
-            _ => add_runs::<1, 1>(target, source, positions),
-        }
-    }
 }
 
 /// y = (A ⊗ 1) x over the owned rows; `x` holds `D` values per local node.

@@ -29,7 +29,8 @@ pub fn seed<const D: usize>(
                 super::file::read_points(&mut points, deck, index, grid, path, share, first_id)?
             }
             (BodySource::Shape { shape, seeding: Seeding::Lattice { spacing, offset } }, _) => {
-                on_lattice(&mut points, index, body, shape, *spacing, offset, share, first_id)?
+                let seeded = Seeded { index, body, shape, share, first_id };
+                seeded.on_lattice(&mut points, *spacing, offset)?
             }
             (BodySource::Shape { shape, seeding }, Grid::Lattice(lattice)) => {
                 let counts = match seeding {
@@ -40,7 +41,8 @@ pub fn seed<const D: usize>(
                 let counts = std::array::from_fn(|a| counts[a]);
                 let cells = SubCells::new(lattice, counts, shape, deck.method.basis);
                 within_lattice(body, shape, &cells, counts, lattice, share)?;
-                per_cell(&mut points, index, body, shape, &cells, counts, lattice, share, first_id)
+                let seeded = Seeded { index, body, shape, share, first_id };
+                seeded.per_cell(&mut points, &cells, counts, lattice)
             }
             (BodySource::Shape { seeding, .. }, Grid::Mesh(mesh))
             | (BodySource::MeshCells { seeding, .. }, Grid::Mesh(mesh)) => {
@@ -162,98 +164,105 @@ fn sub_cell<const D: usize>(cell: [isize; D], sub: usize, counts: [usize; D]) ->
     std::array::from_fn(|a| cell[a] * counts[a] as isize + part[a] as isize)
 }
 
-/// A point for each sub-cell that the shape covers ([`SubCells`]). Returns the number of
-/// candidates.
-#[allow(clippy::too_many_arguments)]
-fn per_cell<const D: usize>(
-    points: &mut Points<D>,
-    index: usize,
-    body: &Body,
-    shape: &Shape,
-    sub_cells: &SubCells<'_, D>,
-    counts: [usize; D],
-    lattice: &Lattice<D>,
-    share: Share,
-    first_id: u64,
-) -> u64 {
-    let (low, size) = cell_window(lattice, shape.bounds());
-    let cells: usize = size.iter().product();
-    let at = |place: &[f64; D]| -> [f64; D] {
-        std::array::from_fn(|a| lattice.origin[a] + lattice.spacing[a] * (low[a] as f64 + place[a]))
-    };
-    let per_cell: usize = counts.iter().product();
-    share.of_box(size, |place| shape.contains(&at(place))).for_each(|candidate, cell| {
-        let cell = std::array::from_fn(|a| (low[a] + cell[a]) as isize);
-        for sub in 0..per_cell {
-            if let Some(made) = sub_cells.point(&sub_cell(cell, sub, counts)) {
-                let id = first_id + (candidate * per_cell + sub) as u64;
-                let (x, half) = (made.position, made.half_length);
-                points.push_unstrained(id, index as u32, x, made.volume, body.density, half);
-                *points.outermost.last_mut().expect("a point was just pushed") =
-                    f64::from(u8::from(made.outermost));
-            }
-        }
-    });
-    (cells * per_cell) as u64
-}
-
 /// Places of a lattice are numbered by values that are exact as 64-bit floats, too.
 const MOST_PLACES: f64 = (1_u64 << 53) as f64;
 
-/// Points at offset + (i, j, k) spacing in the shape's frame, kept where they are inside.
-#[allow(clippy::too_many_arguments)]
-fn on_lattice<const D: usize>(
-    points: &mut Points<D>,
+/// A body whose shape is filled with points.
+struct Seeded<'a> {
+    /// Among the deck's bodies.
     index: usize,
-    body: &Body,
-    shape: &Shape,
-    spacing: f64,
-    offset: &[f64],
+    body: &'a Body,
+    shape: &'a Shape,
     share: Share,
+    /// Identity of its first candidate.
     first_id: u64,
-) -> Result<u64> {
-    let Some((min, max)) = shape.local_bounds() else {
-        return Err(Error::Input(format!(
-            "body \"{}\" is unbounded and seeded by a lattice of spacing {spacing}; intersect it \
-             with a box, or use points_per_cell",
-            body.name
-        )));
-    };
-    let place = |x: f64, axis: usize| (x - offset[axis]) / spacing;
-    let places: f64 = (0..D).map(|a| place(max[a], a) - place(min[a], a) + 4.0).product();
-    let far = (0..D).map(|a| place(min[a], a).abs().max(place(max[a], a).abs()));
-    if !(far.fold(places, f64::max) < MOST_PLACES) {
-        return Err(Error::Input(format!(
-            "body \"{}\": a lattice of spacing {spacing} over its shape, from {min:?} to {max:?}, \
-             has more places than can be numbered; make the shape smaller or the spacing larger",
-            body.name
-        )));
+}
+
+impl Seeded<'_> {
+    /// A point for each sub-cell that the shape covers ([`SubCells`]). Returns the number of
+    /// candidates.
+    fn per_cell<const D: usize>(
+        &self,
+        points: &mut Points<D>,
+        sub_cells: &SubCells<'_, D>,
+        counts: [usize; D],
+        lattice: &Lattice<D>,
+    ) -> u64 {
+        let &Seeded { index, body, shape, share, first_id } = self;
+        let (low, size) = cell_window(lattice, shape.bounds());
+        let cells: usize = size.iter().product();
+        let at = |place: &[f64; D]| -> [f64; D] {
+            std::array::from_fn(|a| {
+                lattice.origin[a] + lattice.spacing[a] * (low[a] as f64 + place[a])
+            })
+        };
+        let per_cell: usize = counts.iter().product();
+        share.of_box(size, |place| shape.contains(&at(place))).for_each(|candidate, cell| {
+            let cell = std::array::from_fn(|a| (low[a] + cell[a]) as isize);
+            for sub in 0..per_cell {
+                if let Some(made) = sub_cells.point(&sub_cell(cell, sub, counts)) {
+                    let id = first_id + (candidate * per_cell + sub) as u64;
+                    let (x, half) = (made.position, made.half_length);
+                    points.push_unstrained(id, index as u32, x, made.volume, body.density, half);
+                    *points.outermost.last_mut().expect("a point was just pushed") =
+                        f64::from(u8::from(made.outermost));
+                }
+            }
+        });
+        (cells * per_cell) as u64
     }
-    let low: [i64; D] =
-        std::array::from_fn(|a| ((min[a] - offset[a]) / spacing).floor() as i64 - 1);
-    let size: [usize; D] = std::array::from_fn(|a| {
-        (((max[a] - offset[a]) / spacing).ceil() as i64 + 2 - low[a]) as usize
-    });
-    let candidates: usize = size.iter().product();
-    let half = [0.5 * spacing; D];
-    let volume = spacing.powi(D as i32);
-    let inside = |place: &[f64; D]| {
-        let local: [f64; D] =
-            std::array::from_fn(|a| offset[a] + (low[a] as f64 + place[a]) * spacing);
-        shape.contains_local(&local)
-    };
-    share.of_box(size, inside).for_each(|candidate, at| {
-        let local: [f64; D] =
-            std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
-        if shape.contains_local(&local) {
-            let placed = shape.to_global(&local);
-            let x = std::array::from_fn(|a| placed[a]);
-            let id = first_id + candidate as u64;
-            points.push_unstrained(id, index as u32, x, volume, body.density, half);
-            mark_outermost(points, |neighbour| shape.contains_local(neighbour), &local, &half);
+
+    /// Points at offset + (i, j, k) spacing in the shape's frame, kept where they are inside.
+    fn on_lattice<const D: usize>(
+        &self,
+        points: &mut Points<D>,
+        spacing: f64,
+        offset: &[f64],
+    ) -> Result<u64> {
+        let &Seeded { index, body, shape, share, first_id } = self;
+        let Some((min, max)) = shape.local_bounds() else {
+            return Err(Error::Input(format!(
+                "body \"{}\" is unbounded and seeded by a lattice of spacing {spacing}; intersect it \
+             with a box, or use points_per_cell",
+                body.name
+            )));
+        };
+        let place = |x: f64, axis: usize| (x - offset[axis]) / spacing;
+        let places: f64 = (0..D).map(|a| place(max[a], a) - place(min[a], a) + 4.0).product();
+        let far = (0..D).map(|a| place(min[a], a).abs().max(place(max[a], a).abs()));
+        if !(far.fold(places, f64::max) < MOST_PLACES) {
+            return Err(Error::Input(format!(
+                "body \"{}\": a lattice of spacing {spacing} over its shape, from {min:?} to {max:?}, \
+             has more places than can be numbered; make the shape smaller or the spacing larger",
+                body.name
+            )));
         }
-    });
-    Ok(candidates as u64)
+        let low: [i64; D] =
+            std::array::from_fn(|a| ((min[a] - offset[a]) / spacing).floor() as i64 - 1);
+        let size: [usize; D] = std::array::from_fn(|a| {
+            (((max[a] - offset[a]) / spacing).ceil() as i64 + 2 - low[a]) as usize
+        });
+        let candidates: usize = size.iter().product();
+        let half = [0.5 * spacing; D];
+        let volume = spacing.powi(D as i32);
+        let inside = |place: &[f64; D]| {
+            let local: [f64; D] =
+                std::array::from_fn(|a| offset[a] + (low[a] as f64 + place[a]) * spacing);
+            shape.contains_local(&local)
+        };
+        share.of_box(size, inside).for_each(|candidate, at| {
+            let local: [f64; D] =
+                std::array::from_fn(|a| offset[a] + (low[a] + at[a] as i64) as f64 * spacing);
+            if shape.contains_local(&local) {
+                let placed = shape.to_global(&local);
+                let x = std::array::from_fn(|a| placed[a]);
+                let id = first_id + candidate as u64;
+                points.push_unstrained(id, index as u32, x, volume, body.density, half);
+                mark_outermost(points, |neighbour| shape.contains_local(neighbour), &local, &half);
+            }
+        });
+        Ok(candidates as u64)
+    }
 }
 
 /// A point is outermost if a neighbour of its seeding would lie outside the shape.

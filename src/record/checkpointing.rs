@@ -7,7 +7,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::cli::Restart;
 use crate::deck::model::{Checkpoint as Plan, Grid as GridSource, MeshSource};
 use crate::deck::physics::physics;
 use crate::deck::{self, Deck};
@@ -28,6 +27,14 @@ use crate::points::Points;
 
 use super::step::Moment;
 use crate::system::model::Model;
+
+/// Which checkpoint a run goes on from.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Restart {
+    /// The newest checkpoint in the results directory.
+    Last,
+    File(PathBuf),
+}
 
 /// Writes checkpoints when the deck or a signal asks for them.
 #[derive(Debug)]

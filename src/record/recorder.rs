@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use crate::cli::Voice;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every};
 use crate::error::{Error, Result};
@@ -100,7 +99,8 @@ pub struct Opening {
     pub versions: BTreeMap<String, String>,
     pub checkpointer: Checkpointer,
     pub resume: Option<Resume>,
-    pub voice: Voice,
+    /// The log has a line for every step.
+    pub verbose: bool,
 }
 
 /// What the summary tells beside what the recorder knows.
@@ -159,7 +159,7 @@ impl Recorder {
     /// The files of a results directory: fresh ones, or those of the run that is resumed, which are
     /// read and tested. Nothing is written before [`Self::open`].
     pub fn create(world: &World, deck: &Deck, opening: Opening) -> Result<Self> {
-        let Opening { directory, mut log, versions, checkpointer, resume, voice } = opening;
+        let Opening { directory, mut log, versions, checkpointer, resume, verbose } = opening;
         let comm = world.comm();
         let layout = Layout {
             dimension: deck.dimension,
@@ -198,7 +198,7 @@ impl Recorder {
         };
         let same_directory = goes_on.is_some();
         let interval = match deck.output.log {
-            _ if voice == Voice::Verbose => Interval::Steps(1),
+            _ if verbose => Interval::Steps(1),
             Every::Steps(steps) => Interval::Steps(steps),
             Every::Seconds(seconds) => Interval::Seconds(seconds),
         };

@@ -8,7 +8,7 @@ use std::path::Path;
 use mpi::environment::Universe;
 use mpi::traits::*;
 
-use crate::cli::{self, Arguments, Restart};
+use crate::cli::{self, Arguments};
 use crate::deck::model::{AnalysisType, Ghost};
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
@@ -31,7 +31,7 @@ use crate::analysis::explicit::Explicit;
 use crate::analysis::implicit::{self, Implicit};
 use crate::analysis::{conditioning, solver, time_loop};
 use crate::output::summary::Communication;
-use crate::record::checkpointing::{self, Checkpointer};
+use crate::record::checkpointing::{self, Checkpointer, Restart};
 use crate::record::clock::Clock;
 use crate::record::context::Run;
 use crate::record::recorder::{Closing, Ending, Opening, Recorder, Resume, restore_balance};
@@ -247,8 +247,8 @@ impl Start<'_> {
         };
         let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
         let (log, versions, into) = (self.log, self.versions, directory.clone());
-        let voice = self.arguments.voice;
-        let opening = Opening { directory: into, log, versions, checkpointer, resume, voice };
+        let verbose = self.arguments.voice == cli::Voice::Verbose;
+        let opening = Opening { directory: into, log, versions, checkpointer, resume, verbose };
         let mut recorder = Recorder::create(world, &model.deck, opening)?;
         // All of the earlier part is known to fit: now it may be changed.
         if let (Some((used, step)), Some(choice)) = (&earlier, &self.arguments.restart) {

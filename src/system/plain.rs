@@ -7,7 +7,8 @@ use crate::deck::model::Frame;
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 use super::scatter::BlockMatrix;
-use super::terms::stress::{Health, StepPoints, displacement_gradient, respond};
+use super::terms::stress::{StepPoints, displacement_gradient, respond};
+use super::terms::term::Health;
 
 /// As [`crate::system::terms::stress::assemble`], to rounding.
 pub fn assemble<const D: usize>(

@@ -2,6 +2,7 @@
 
 use crate::parallel::{World, exchange_known};
 
+use super::kernel::add_runs;
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 
@@ -86,6 +87,23 @@ impl<const B: usize> BlockMatrix<B> {
     /// [`reduce_while`] of this matrix. Collective over neighbours.
     pub fn reduce(&mut self, world: &World, pattern: &Pattern) {
         reduce_while(world, pattern, self, |_| ());
+    }
+}
+
+/// Adds a dense matrix over the nodes of a support of the pattern, row by row.
+pub fn add_support(matrix: &mut BlockMatrix<1>, pattern: &Pattern, support: usize, block: &[f64]) {
+    let nodes = pattern.supports.list(support);
+    let place = pattern.places.of(support);
+    let width = nodes.len() / place.run;
+    let rows = block.chunks_exact(nodes.len()).zip(place.positions.chunks_exact(width));
+    for (&node, (source, positions)) in nodes.iter().zip(rows) {
+        let row = pattern.row_of[node as usize] as usize;
+        let target = &mut matrix.values[pattern.offsets[row]..pattern.offsets[row + 1]];
+        match place.run {
+            3 => add_runs::<1, 3>(target, source, positions),
+            2 => add_runs::<1, 2>(target, source, positions),
+            _ => add_runs::<1, 1>(target, source, positions),
+        }
     }
 }
 

@@ -353,7 +353,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
             conditions: &conditions,
             left_out: &left_out,
             external_owned: vec![0.0; owned],
-            inertia: None,
+            terms: Vec::new(),
         };
         Equilibrium::new(world, &model.grid, &mesh, step, equations, settings)
     };

@@ -1,9 +1,18 @@
-//! Contributions to a step's equations.
+//! Contributions to a step's equations. A new one is a file that implements [`Term`] and a line
+//! where `analysis/equilibrium.rs` lists the terms of a step.
 //!
 //! | term | file | source |
 //! |---|---|---|
+//! | what each of them says of itself | `term.rs` | |
 //! | internal force and tangent stiffness of the points | `stress.rs` | Lagrangian eq. 27, 28 |
-//! | Ghost stiffness, inertia | `linear.rs` | Ghost eq. 28, §3.3 |
+//! | Ghost stiffness | `ghost.rs` | Ghost eq. 27, 28 |
+//! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
+//! | products of the last two | `scalar.rs` | |
 
-pub mod linear;
+pub mod ghost;
+pub mod inertia;
+mod scalar;
 pub mod stress;
+pub mod term;
+
+pub use term::Term;

@@ -12,10 +12,13 @@ use crate::tensor::dense;
 use crate::tensor::fused::{self, multiply_add};
 
 use crate::system::border::Border;
+use crate::system::in_place::InPlace;
 use crate::system::kernel::Batch;
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockRows;
+
+use super::term::{At, Health, Part, Term};
 
 /// What a step's points look like to the equations: fixed while the step is solved.
 #[derive(Clone, Copy)]
@@ -47,25 +50,57 @@ impl<'a, const D: usize> StepPoints<'a, D> {
     }
 }
 
-/// Health of an evaluation on this rank.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Health {
-    /// Point index with det dF <= 0, if any.
-    pub inverted: Option<usize>,
-    /// Point index with a stress that is not finite, if any.
-    pub not_finite: Option<usize>,
+/// The stress of the points as a term of the equations.
+pub struct Stress<'a, const D: usize> {
+    pub step: StepPoints<'a, D>,
+    pub frame: Frame,
+    /// The tangents of all materials are symmetric.
+    pub symmetric: bool,
 }
 
-impl Health {
-    pub fn is_sound(&self) -> bool {
-        self.not_finite.is_none()
+impl<const D: usize> Term<D> for Stress<'_, D> {
+    fn symmetric(&self) -> bool {
+        self.symmetric
     }
 
-    /// Of both, the first to be named of either kind.
-    pub fn and(self, other: Health) -> Health {
-        Health {
-            inverted: self.inverted.or(other.inverted),
-            not_finite: self.not_finite.or(other.not_finite),
+    fn add_shares(
+        &self,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        rows: Option<&mut InPlace<'_, D>>,
+    ) -> Health {
+        let border = self.step.border;
+        let which = match part {
+            Part::Reaching => &border.reaching,
+            Part::Inner => &border.inner,
+        };
+        assemble_groups(self.step, which, self.frame, at.pattern, at.displacement, force, rows)
+    }
+
+    /// A point's share at a node a is |∇S_a| V M (|b_e - 1| + Σ_b |u_b| |∇S_b|), M its modulus of
+    /// pressure waves: a stress carries the round-off of the strain it was made from, and that the
+    /// one of the displacements it is the difference of.
+    fn add_share_sizes(&self, at: At<'_>, size: &mut [f64]) {
+        let step = self.step;
+        let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        let moved: Vec<f64> = at.displacement.chunks_exact(D).map(norm).collect();
+        for p in 0..step.points.len() {
+            let points = step.points;
+            let modulus =
+                local(step.materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
+            let gradients = &step.influences.gradients[step.influences.row(p)];
+            let around = step.nodes_of(p);
+            let strain: f64 = around
+                .iter()
+                .zip(gradients)
+                .map(|(&node, gradient)| moved[node as usize] * norm(gradient))
+                .sum();
+            let strain = strain + points.elastic_excess[p].norm();
+            let force = modulus * strain * points.volume(p).abs();
+            for (&node, gradient) in around.iter().zip(gradients) {
+                size[node as usize] += force * norm(gradient);
+            }
         }
     }
 }

@@ -1,0 +1,91 @@
+//! What a contribution to a step's equations f(u) = f_ext says of itself.
+
+use crate::system::in_place::InPlace;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockMatrix;
+
+/// An iterate.
+#[derive(Clone, Copy)]
+pub struct At<'a> {
+    pub pattern: &'a Pattern,
+    /// Nodal increments of the local degrees of freedom, m.
+    pub displacement: &'a [f64],
+}
+
+/// Which shares are asked for: what other ranks wait for comes first, and travels while the rest is
+/// added up.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// Those that reach nodes of other ranks.
+    Reaching,
+    /// The others.
+    Inner,
+}
+
+/// Health of an evaluation on this rank.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Health {
+    /// Point index with det dF <= 0, if any.
+    pub inverted: Option<usize>,
+    /// Point index with a stress that is not finite, if any.
+    pub not_finite: Option<usize>,
+}
+
+impl Health {
+    pub fn is_sound(&self) -> bool {
+        self.not_finite.is_none()
+    }
+
+    /// Of both, the first to be named of either kind.
+    pub fn and(self, other: Health) -> Health {
+        Health {
+            inverted: self.inverted.or(other.inverted),
+            not_finite: self.not_finite.or(other.not_finite),
+        }
+    }
+}
+
+/// A contribution to the equations. It adds what it has: as shares at local nodes, which are summed
+/// over ranks afterwards, or to owned rows, when the shares of all ranks are there. Terms are asked
+/// in their order, once for each part or all rows: no call is made per point.
+pub trait Term<const D: usize> {
+    /// Whether its tangent equals its transposed.
+    fn symmetric(&self) -> bool {
+        true
+    }
+
+    /// This rank's shares: `force` of the local degrees of freedom, N, and the tangent, N/m, where
+    /// there are `rows`.
+    fn add_shares(
+        &self,
+        _part: Part,
+        _at: At<'_>,
+        _force: &mut [f64],
+        _rows: Option<&mut InPlace<'_, D>>,
+    ) -> Health {
+        Health::default()
+    }
+
+    /// `force` of the owned degrees of freedom, N.
+    fn add_force(&self, _at: At<'_>, _force: &mut [f64]) {}
+
+    /// The tangent in the first `owned` rows, N/m.
+    fn add_tangent(&self, _pattern: &Pattern, _owned: usize, _rows: &mut InPlace<'_, D>) {}
+
+    /// J of a constant tangent J ⊗ 1 that owned rows may begin with when they are first met, and
+    /// which of them it reaches. One term of a step has it: [`Self::add_tangent`] then adds nothing.
+    fn first_in_rows(&self) -> Option<(&BlockMatrix<1>, &[bool])> {
+        None
+    }
+
+    /// Energy of the increments that the points do not hold, this rank's share, J.
+    fn energy(&self, _at: At<'_>) -> f64 {
+        0.0
+    }
+
+    /// Sizes of what [`Self::add_shares`] sums, at local nodes, N: the floor of round-off.
+    fn add_share_sizes(&self, _at: At<'_>, _size: &mut [f64]) {}
+
+    /// Sizes of what [`Self::add_force`] sums, at owned nodes, N; `moved`: |u| of local nodes, m.
+    fn add_sizes(&self, _pattern: &Pattern, _moved: &[f64], _size: &mut [f64]) {}
+}
