@@ -33,7 +33,8 @@ fn beam_becomes_a_deck() {
     assert_eq!(deck.boundaries[0].fix, [0]);
     assert_eq!(deck.boundaries[1].name, "boundary-2");
     let Load::Point { nearest, force, .. } = &deck.loads[0] else { panic!("a point load") };
-    assert_eq!((nearest.len(), force), (2, &vec![0.0, -100e3]));
+    let force: Vec<_> = force.iter().map(|f| f.as_constant()).collect();
+    assert_eq!((nearest.len(), force), (2, vec![Some(0.0), Some(-100e3)]));
     assert_eq!(deck.output.every, Every::Steps(5));
     assert_eq!(
         deck.petsc,

@@ -25,6 +25,7 @@ use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
 use crate::system::terms::Term;
 use crate::system::terms::ghost::Ghost;
+use crate::system::terms::pressure::PressureTerm;
 use crate::system::terms::stress::{StepPoints, Stress};
 use crate::system::terms::term::{At, Health, Part};
 
@@ -66,7 +67,10 @@ pub struct Equilibrium<'a, const D: usize> {
     /// Fixed by a condition, or left out (`drop_below`).
     held: Held,
     increment: Vec<f64>,
+    /// All external forces of the last evaluation.
     external_owned: Vec<f64>,
+    external_previous: Vec<f64>,
+    pressure: Option<Pressed<'a, D>>,
     /// What is summed, in this order.
     terms: Vec<Box<dyn Term<D> + 'a>>,
     layout: Layout<D>,
@@ -95,6 +99,38 @@ pub struct Equilibrium<'a, const D: usize> {
     pub health: Health,
     /// Wall time of all evaluations, s.
     pub assembly_seconds: f64,
+}
+
+/// External forces that follow the motion.
+struct Pressed<'a, const D: usize> {
+    term: PressureTerm<'a>,
+    step: StepPoints<'a, D>,
+    /// Share of the forces of a step's end in its equations: 1 + alpha of the HHT method.
+    share: f64,
+    /// What acts besides, owned.
+    dead: Vec<f64>,
+    /// Of the last evaluation, owned.
+    force: Vec<f64>,
+}
+
+impl<const D: usize> Pressed<'_, D> {
+    /// external = dead + share force, from this rank's shares of `force` at its local nodes.
+    /// Collective.
+    fn join(
+        &mut self,
+        world: &World,
+        numbering: &Numbering,
+        mut force: Vec<f64>,
+        external: &mut [f64],
+    ) -> Result<()> {
+        numbering.halo.reverse_add(world, &mut force, D)?;
+        force.truncate(numbering.owned * D);
+        for ((total, dead), f) in external.iter_mut().zip(&self.dead).zip(&force) {
+            *total = dead + self.share * f;
+        }
+        self.force = force;
+        Ok(())
+    }
 }
 
 /// What the values of the matrix are, compared with the last evaluation.
@@ -146,7 +182,9 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             settings,
             held,
             increment,
+            external_previous: external_owned.clone(),
             external_owned,
+            pressure: None,
             terms,
             layout,
             beside,
@@ -166,6 +204,24 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             at_round_off: false,
             health: Health::default(),
         })
+    }
+
+    /// The same equations with pressures on the bodies' surfaces; `share`: 1 + alpha of the HHT
+    /// method, else 1.
+    pub fn with_pressure(
+        mut self,
+        term: Option<PressureTerm<'a>>,
+        step: StepPoints<'a, D>,
+        share: f64,
+    ) -> Self {
+        let (dead, force) = (self.external_owned.clone(), Vec::new());
+        self.pressure = term.map(|term| Pressed { term, step, share, dead, force });
+        self
+    }
+
+    /// Force of the pressures in the last evaluation, owned nodes; empty without any.
+    pub fn pressure_force(&self) -> &[f64] {
+        self.pressure.as_ref().map_or(&[], |pressed| &pressed.force)
     }
 
     /// Acts on the matrix as multigrid reads it.
@@ -260,10 +316,16 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self.tangent = Tangent::Stale;
         let (world, pattern, terms) = (self.world, self.pattern, &self.terms);
         let at = At { pattern, displacement: &self.displacement };
-        let add = |part: Part, force: &mut [f64], mut rows: Option<&mut InPlace<'_, D>>| {
-            terms.iter().fold(Health::default(), |health, term| {
+        let pressure = self.pressure.as_ref();
+        let mut pressed = vec![0.0; pressure.map_or(0, |_| numbering.len() * D)];
+        let mut add = |part: Part, force: &mut [f64], mut rows: Option<&mut InPlace<'_, D>>| {
+            let health = terms.iter().fold(Health::default(), |health, term| {
                 health.and(term.add_shares(part, at, force, rows.as_deref_mut()))
-            })
+            });
+            if let Some(all) = pressure {
+                all.term.add_shares(all.step, part, at, &mut pressed, rows);
+            }
+            health
         };
         // What other ranks wait for comes first, and travels while the rest is added up.
         let reaching = add(Part::Reaching, &mut force, rows.as_mut());
@@ -290,6 +352,9 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             term.add_force(at, &mut force);
         }
         self.internal_owned = force;
+        if let Some(all) = &mut self.pressure {
+            all.join(world, numbering, pressed, &mut self.external_owned)?;
+        }
         let Some(mut rows) = rows else { return Ok(true) };
         for term in terms {
             term.add_tangent(pattern, numbering.owned, &mut rows);
@@ -380,7 +445,8 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         }
         self.numbering.halo.forward(self.world, &mut change, D)?;
         for (dof, sum) in self.held.reactions::<D>(self.pattern, &change) {
-            self.reaction_owned[dof] = self.internal_previous[dof] + sum - self.external_owned[dof];
+            self.reaction_owned[dof] =
+                self.internal_previous[dof] + sum - self.external_previous[dof];
         }
         Ok(())
     }
@@ -467,6 +533,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         self.errors.push(error);
         self.previous_owned.copy_from_slice(x);
         self.internal_previous.copy_from_slice(&self.internal_owned);
+        self.external_previous.copy_from_slice(&self.external_owned);
         let last = iteration + 1 >= self.settings.max_evaluations;
         Ok(if !error.is_finite() {
             Verdict::Diverged("the residual is not finite".into())

@@ -35,6 +35,8 @@ pub(crate) struct Nodes<'a, const D: usize> {
     pub inverse: Inverse<'a, D>,
     /// Of the points, N; empty without loads.
     external: &'a [[f64; D]],
+    /// Force of pressures at the step's start, N: of the owned degrees of freedom, empty for none.
+    pub pressed: &'a [f64],
     dt: f64,
     /// Held components move with their boundary's mean velocity over the step.
     held_velocity: Vec<f64>,
@@ -85,6 +87,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
             light,
             inverse,
             external,
+            pressed: &[],
             dt,
             held_velocity,
             at_rest,
@@ -114,6 +117,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
                 }))
             })?;
             self.hand_on(step, &mut momentum)?;
+            self.press(&mut pushed);
             self.hand_on(step, &mut pushed)?;
             self.require_mass(&pushed)?;
             let prescribed: [&[f64]; 2] = [&self.held_velocity, &self.at_rest];
@@ -163,6 +167,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
                 mapping::add_force(step, part, self.external, deformation, forces);
             }))
         })?;
+        self.press(&mut pushed);
         self.hand_on(step, &mut pushed)?;
         self.require_mass(&pushed)?;
         let mut acceleration =
@@ -250,6 +255,12 @@ impl<'a, const D: usize> Nodes<'a, D> {
         });
         self.hand_on(step, &mut momentum)?;
         Ok(momentum)
+    }
+
+    /// Adds the pressures.
+    fn press(&self, sums: &mut [[f64; D]]) {
+        let sums = sums.as_flattened_mut();
+        sums.iter_mut().zip(self.pressed).for_each(|(sum, f)| *sum += f);
     }
 
     /// Hands on what acts at light nodes. Collective.

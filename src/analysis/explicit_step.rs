@@ -8,6 +8,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::terms::pressure::PressureTerm;
 use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 
@@ -57,7 +58,14 @@ pub(crate) fn advance<const D: usize>(
         let light = LightNodes::find(world, &mesh, step, grid.cell_size(), &mut mass)?;
         Ok((mass, light))
     })?;
+    let pressed = match PressureTerm::new(model, span.factor_start, span.time_start) {
+        Some(term) => {
+            term.owned_at_start(world, &mesh, mesh.step_points(points, &model.materials))?
+        }
+        None => Vec::new(),
+    };
     let mut nodes = Nodes::new(world, model, &mesh, &conditions, (&mass, light), &external, dt)?;
+    nodes.pressed = &pressed;
 
     let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;
     let carrier = carrier(model);
@@ -91,7 +99,9 @@ pub(crate) fn advance<const D: usize>(
     for (r, taken) in residual.iter_mut().zip(&nodes.taken) {
         *r += taken / dt;
     }
+    let pressure_work: f64 = pressed.iter().zip(&moved).map(|(f, u)| f * u).sum();
     let work = point_work(&external, &made.displacement)
+        + pressure_work
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);
     let linear_iterations = nodes.inverse.iterations();

@@ -1,19 +1,23 @@
 //! f_ext of an implicit step at both of its ends (Lagrangian eq. 29).
 
 use crate::error::Result;
-use crate::loads::point_forces::map_forces;
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
+use crate::system::terms::pressure::PressureTerm;
+use crate::transfer::mapping;
 
 /// External forces of a step, N.
 pub(super) struct Loads<const D: usize> {
     /// On the points at the start.
     pub points_start: Vec<[f64; D]>,
-    /// Of the owned degrees of freedom, here and below.
+    /// This rank's share of the pressures at the start, at the local nodes; empty without any.
+    pub pressed_start: Vec<f64>,
+    /// Of the owned degrees of freedom, here and below, with the pressures.
     pub external_start: Vec<f64>,
+    /// The pressures at the end are known once the step is solved.
     pub external_end: Vec<f64>,
 }
 
@@ -28,12 +32,27 @@ impl<const D: usize> Loads<D> {
     ) -> Result<Self> {
         let points_start = model.point_forces(world, points, span.factor_start, span.time_start)?;
         let points_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
+        let mut external_start = owned_forces(world, mesh, &points_start)?;
+        let mut pressed_start = Vec::new();
+        if let Some(term) = PressureTerm::new(model, span.factor_start, span.time_start) {
+            let step = mesh.step_points(points, &model.materials);
+            pressed_start = term.at_start(step, &mesh.pattern, mesh.numbering.len());
+            let mut owned = pressed_start.clone();
+            mesh.numbering.halo.reverse_add(world, &mut owned, D)?;
+            add(&mut external_start, 1.0, &owned);
+        }
         Ok(Loads {
-            external_start: owned_forces(world, mesh, &points_start)?,
+            external_start,
+            pressed_start,
             external_end: owned_forces(world, mesh, &points_end)?,
             points_start,
         })
     }
+}
+
+/// a += share b over the shorter of both.
+pub(super) fn add(a: &mut [f64], share: f64, b: &[f64]) {
+    a.iter_mut().zip(b).for_each(|(a, b)| *a += share * b);
 }
 
 /// Nodal external force of the owned degrees of freedom. Collective.
@@ -43,7 +62,7 @@ fn owned_forces<const D: usize>(
     forces: &[[f64; D]],
 ) -> Result<Vec<f64>> {
     let numbering = &mesh.numbering;
-    let mut nodal = map_forces(numbering, &mesh.influences, forces);
+    let mut nodal = mapping::forces_at_nodes(numbering, &mesh.influences, forces);
     numbering.halo.reverse_add(world, &mut nodal, D)?;
     nodal.truncate(numbering.owned * D);
     Ok(nodal)

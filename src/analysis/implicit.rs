@@ -19,7 +19,7 @@ use crate::transfer::refusal::Halt;
 use crate::transfer::update;
 
 use super::equilibrium::StepEquations;
-use super::external::Loads;
+use super::external::{Loads, add};
 use super::inertial::{Dynamics, InertialStep};
 use super::load_steps::Stepping;
 use super::newton::{self, Carried};
@@ -94,7 +94,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         let (mesh, conditions) = clock.time(Phase::Locate, || {
             Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
         })?;
-        let (loads, left_out) = clock.time(Phase::Assemble, || {
+        let (mut loads, left_out) = clock.time(Phase::Assemble, || {
             let loads = Loads::of_step(world, model, points, &mesh, span)?;
             Ok((loads, mesh.nodes_left_out(world, model.deck.method.drop_below)))
         })?;
@@ -103,16 +103,19 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             None => None,
         };
         let Run { clock, .. } = &mut *run;
-        let (driving, terms) = clock.time(Phase::Assemble, || {
+        let (mut driving, terms) = clock.time(Phase::Assemble, || {
             Ok(match &inertial {
                 Some(inertial) => inertial.equations(&mesh, &loads),
                 None => (loads.external_end.clone(), Vec::new()),
             })
         })?;
         let (conditions, left_out) = (&conditions, &left_out[..]);
+        let share = 1.0 + run.model.deck.analysis.hht_alpha;
         let equations =
             StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
-        let solved = newton::solve(run, &mesh, equations, &mut self.trials, number)?;
+        let solved = newton::solve(run, &mesh, equations, &mut self.trials, next)?;
+        add(&mut loads.external_end, 1.0, &solved.pressure);
+        add(&mut driving, share, &solved.pressure);
         let displacement = solved.displacement;
 
         let Run { world, model, points, clock, .. } = &mut *run;

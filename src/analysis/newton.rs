@@ -10,9 +10,11 @@ use crate::petsc::snes::NewtonOutcome;
 use crate::petsc::{Matrix, Vector};
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
+use crate::system::terms::pressure::PressureTerm;
 
 use super::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use super::solver::{self, Linear, Trials};
+use super::time_loop::Next;
 use crate::record::context::Run;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
@@ -28,6 +30,8 @@ pub struct Converged {
     pub internal: Vec<f64>,
     /// The same at zero displacement.
     pub internal_start: Vec<f64>,
+    /// Force of the pressures at the end, N; empty without any.
+    pub pressure: Vec<f64>,
     /// u K_G u / 2 over all ranks, J.
     pub ghost_energy: f64,
     /// Normalised residual at the end.
@@ -48,19 +52,21 @@ pub fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
     }
 }
 
-/// Solves the equations of step `number` and reports the iterations. Collective.
+/// Solves the equations of a step and reports the iterations. Collective.
 pub fn solve<const D: usize>(
     run: &mut Run<D>,
     mesh: &Discretisation<D>,
     equations: StepEquations<'_, D>,
     trials: &mut Trials,
-    number: usize,
+    Next { span, number }: Next,
 ) -> std::result::Result<Converged, Halt> {
     let Run { world, model, points, recorder, clock } = run;
     let numbering = &mesh.numbering;
     let step = mesh.step_points(points, &model.materials);
     let mut problem = clock.time(Phase::Assemble, || {
-        Equilibrium::new(world, &model.grid, mesh, step, equations, settings(model))
+        let pressure = PressureTerm::new(model, span.factor_end, span.time_end);
+        let problem = Equilibrium::new(world, &model.grid, mesh, step, equations, settings(model));
+        Ok(problem?.with_pressure(pressure, step, 1.0 + model.deck.analysis.hht_alpha))
     })?;
     let mut matrix =
         clock.time(Phase::Assemble, || solver::matrix(world, model, numbering, &mesh.pattern))?;
@@ -102,6 +108,7 @@ pub fn solve<const D: usize>(
         displacement: problem.displacement().to_vec(),
         internal: problem.internal_force().to_vec(),
         internal_start: problem.internal_force_at_start().to_vec(),
+        pressure: problem.pressure_force().to_vec(),
         ghost_energy: world.sum(problem.ghost_energy()),
         residual,
         evaluations: problem.errors.len(),

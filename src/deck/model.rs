@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 
-use super::expression::{Expression, Scope};
+use super::expression::{Expression, Scope, Variable};
 use super::places::Places;
 use super::shape::Shape;
 use crate::material::Entry;
@@ -401,18 +401,55 @@ pub enum Place {
     CellsOf { body: usize },
 }
 
+/// In quasi-static runs values that hold neither `s` nor `t` are ramped with the load factor.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Load {
-    /// Total force, N (2D: N/m), shared equally by the points nearest to the given places.
-    Point { body: usize, nearest: Vec<Vec<f64>>, force: Vec<f64> },
-    /// m/s2
-    Gravity(Vec<f64>),
+    /// Total force, N (2D: N/m), expressions of s and t, shared equally by the points nearest to
+    /// the given places.
+    Point { body: usize, nearest: Vec<Vec<f64>>, force: Vec<Expression> },
+    /// m/s2, expressions of X, Y, Z, s, t.
+    Gravity(Vec<Expression>),
     /// N/m3 of *initial* volume, expressions of X, Y, Z, x, y, z, s, t.
-    /// Without `s` or `t` it is ramped linearly in quasi-static runs.
     BodyForce(Vec<Expression>),
+    /// Pa, an expression of x, y, z, s, t: a pressure on the surface of all bodies.
+    Pressure { value: Expression, zone: Option<PressureZone> },
+    /// Pa per initial area, expressions of X, Y, Z, s, t: a traction on a side of a body.
+    Traction { side: BodySide, value: Vec<Expression> },
     /// Body force (N per initial volume) that makes this displacement field exact: one expression
     /// per axis of X, Y, Z, s (manufactured solution).
     Manufactured(Vec<Expression>),
+}
+
+impl Load {
+    /// Whether it may resist a motion along an axis: a pressure that varies along it.
+    pub fn may_hold(&self, axis: usize) -> bool {
+        const PLACE: [Variable; 3] = [Variable::CurrentX, Variable::CurrentY, Variable::CurrentZ];
+        match self {
+            Load::Pressure { value, zone } => zone.is_some() || value.depends_on(PLACE[axis]),
+            _ => false,
+        }
+    }
+}
+
+/// A side of a body that is a box along the axes, at the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodySide {
+    pub body: usize,
+    pub axis: usize,
+    pub upper: bool,
+    /// Its place along the axis, m.
+    pub at: f64,
+    /// m2 (m in 2D)
+    pub area: f64,
+}
+
+/// Where a pressure acts in full, in current positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureZone {
+    pub min: Vec<f64>,
+    pub max: Vec<f64>,
+    /// Width over which it falls to zero outside, m; `None`: three cells.
+    pub fade: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

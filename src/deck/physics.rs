@@ -73,8 +73,12 @@ fn may_be_extended(deck: &Deck) -> bool {
         .iter()
         .any(|boundary| boundary.rotation.is_some() || boundary.displacement.iter().any(total));
     let load_totals = deck.loads.iter().any(|load| match load {
-        Load::BodyForce(all) | Load::Manufactured(all) => all.iter().any(of_factor),
-        Load::Point { .. } | Load::Gravity(_) => false,
+        Load::Pressure { value, .. } => of_factor(value),
+        Load::Point { force: all, .. }
+        | Load::Gravity(all)
+        | Load::Traction { value: all, .. }
+        | Load::BodyForce(all)
+        | Load::Manufactured(all) => all.iter().any(of_factor),
     });
     let dynamic =
         matches!(deck.analysis.kind, AnalysisType::Explicit | AnalysisType::ImplicitDynamic);

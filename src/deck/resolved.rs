@@ -340,12 +340,30 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
                 let point = inline(&[
                     ("body", quote(&deck.bodies[*body].name)),
                     ("nearest", array(nearest.iter().map(|x| vector(x)))),
-                    ("force", vector(force)),
+                    ("force", expressions(force)),
                 ]);
                 w.line("load", "point", point);
             }
-            Load::Gravity(gravity) => w.line("load", "gravity", vector(gravity)),
+            Load::Gravity(gravity) => w.line("load", "gravity", expressions(gravity)),
             Load::BodyForce(force) => w.line("load", "body_force", expressions(force)),
+            Load::Traction { side, value } => {
+                let pairs = [
+                    ("body", quote(&deck.bodies[side.body].name)),
+                    ("side", quote(SIDES[2 * side.axis + usize::from(side.upper)])),
+                    ("value", expressions(value)),
+                ];
+                w.line("load", "traction", inline(&pairs));
+            }
+            Load::Pressure { value, zone } => {
+                let mut pairs = vec![("value", expression(value))];
+                if let Some(zone) = zone {
+                    let limits = [("min", vector(&zone.min)), ("max", vector(&zone.max))];
+                    let mut place = vec![("box", inline(&limits))];
+                    place.extend(zone.fade.map(|fade| ("fade", number(fade))));
+                    pairs.push(("where", inline(&place)));
+                }
+                w.line("load", "pressure", inline(&pairs));
+            }
             Load::Manufactured(field) => w.line("load", "manufactured", expressions(field)),
         }
     }

@@ -7,12 +7,14 @@
 
 use nalgebra::Matrix3;
 
+use super::{Load, Moment, scope_of};
 use crate::deck::Scope;
 use crate::deck::expression::{Expression, Jet, Smooth};
 use crate::deck::model::Frame;
 use crate::error::{Error, Result};
-use crate::material::LocalMaterial;
+use crate::material::{LocalMaterial, Material, local};
 use crate::mechanics::{self, StepStart};
+use crate::points::Points;
 
 /// A displacement field of X and s (or t) with its derivatives.
 #[derive(Debug, Clone)]
@@ -99,6 +101,25 @@ impl Manufactured {
     }
 }
 
+impl<const D: usize> Load<D> for Manufactured {
+    fn add_to_points(
+        &self,
+        points: &Points<D>,
+        materials: &[Material],
+        at: Moment,
+        forces: &mut [[f64; D]],
+    ) -> Result<()> {
+        for (p, force) in forces.iter_mut().enumerate() {
+            let scope = scope_of(points, p, at.load_factor, at.time);
+            let made: [f64; D] = self.force(local(materials, points, p), &scope)?;
+            for (f, b) in force.iter_mut().zip(made) {
+                *f += b * points.volume_initial[p];
+            }
+        }
+        Ok(())
+    }
+}
+
 /// F - 1 = du/dX.
 fn displacement_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
     std::array::from_fn(|k| std::array::from_fn(|l| jets[k].first[l]))
@@ -107,7 +128,7 @@ fn displacement_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Hencky, Material};
+    use crate::material::Hencky;
 
     fn first_piola(
         material: LocalMaterial<'_>,

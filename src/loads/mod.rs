@@ -1,9 +1,163 @@
-//! External forces.
+//! f_ext: external forces at the points (Lagrangian eq. 24, 25, 29).
 //!
-//! | load | file | source |
-//! |---|---|---|
-//! | gravity, body forces, point forces | `point_forces.rs` | Lagrangian eq. 29 |
-//! | body forces that make a given field exact | `manufactured.rs` | Lagrangian §7.4 |
+//! | deck key | type | file | source |
+//! |---|---|---|---|
+//! | `point` | [`PointForce`] | `point.rs` | Lagrangian eq. 29: S f_p |
+//! | `gravity` | [`Gravity`] | `gravity.rs` | Lagrangian eq. 24: S m g |
+//! | `body_force` | [`BodyForce`] | `body_force.rs` | Lagrangian eq. 24: S b V0 |
+//! | `pressure` | [`Pressure`] | `pressure.rs` | Given et al. 2024: virtual stress |
+//! | `traction` | [`Traction`] | `traction.rs` | formulations.md B.6 (b) |
+//! | `manufactured` | [`Manufactured`] | `manufactured.rs` | Lagrangian §7.4 |
+//!
+//! A new load is one file that implements [`Load`] and one line of [`of_deck`].
 
+mod body_force;
+mod gravity;
 pub mod manufactured;
-pub mod point_forces;
+mod point;
+pub mod pressure;
+pub mod traction;
+
+pub use body_force::BodyForce;
+pub use gravity::Gravity;
+pub use manufactured::Manufactured;
+pub use point::{Carriers, PointForce};
+pub use pressure::Pressure;
+pub use traction::Traction;
+
+use crate::deck::Scope;
+use crate::deck::expression::Expression;
+use crate::deck::model::{self, AnalysisType};
+use crate::error::{Error, Result};
+use crate::material::Material;
+use crate::points::Points;
+
+/// The moment at which loads are asked for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Moment {
+    /// s, 0 to 1 over the analysis.
+    pub load_factor: f64,
+    /// t, s.
+    pub time: f64,
+    /// Factor of values that hold neither s nor t: s in quasi-static runs, 1 in dynamics.
+    pub ramp: f64,
+}
+
+impl Moment {
+    pub fn new(kind: AnalysisType, load_factor: f64, time: f64) -> Self {
+        let ramp = if kind == AnalysisType::QuasiStatic { load_factor } else { 1.0 };
+        Moment { load_factor, time, ramp }
+    }
+
+    /// Variables of an expression that holds no place.
+    pub fn scope(&self) -> Scope {
+        Scope { load_factor: self.load_factor, time: self.time, ..Scope::default() }
+    }
+
+    /// Factor of an expression's value: 1 where it says itself how it depends on s or t.
+    pub fn factor_of(&self, expression: &Expression) -> f64 {
+        if expression.depends_on_time() { 1.0 } else { self.ramp }
+    }
+
+    /// One ramped value per axis in `scope`.
+    fn values<const D: usize>(&self, expressions: &[Expression], scope: &Scope) -> [f64; D] {
+        std::array::from_fn(|a| {
+            let expression = &expressions[a];
+            self.factor_of(expression) * expression.value(scope)
+        })
+    }
+}
+
+/// An external load.
+pub trait Load<const D: usize> {
+    /// Adds the force on each point, N, to `forces`. Error: it has none there.
+    fn add_to_points(
+        &self,
+        points: &Points<D>,
+        materials: &[Material],
+        at: Moment,
+        forces: &mut [[f64; D]],
+    ) -> Result<()>;
+
+    /// The pressure on the surface, for a load that is one: it acts on the nodes and follows the
+    /// motion within a step.
+    fn pressure(&self) -> Option<&Pressure> {
+        None
+    }
+
+    /// Whether the tangent of the load equals its transposed. Loads that do not follow the motion
+    /// within a step have none.
+    fn symmetric(&self) -> bool {
+        true
+    }
+}
+
+/// What the start of a run tells of a load.
+#[derive(Debug, Clone, Default)]
+pub struct Found {
+    /// Who carries a point force that is a function.
+    pub carriers: Carriers,
+    /// Initial volume of the points that carry a traction, m3.
+    pub volume: f64,
+}
+
+/// What the deck asks for, in its order, with what was `found` of each;
+/// `cell`: size of the grid's cells, m.
+/// Error: a formula cannot serve.
+pub fn of_deck<const D: usize>(
+    loads: &[model::Load],
+    found: &[Found],
+    cell: f64,
+) -> Result<Vec<Box<dyn Load<D>>>> {
+    let made = loads.iter().zip(found).map(|(load, found)| -> Result<Box<dyn Load<D>>> {
+        Ok(match load {
+            model::Load::Point { force, .. } => Box::new(PointForce::new(force, &found.carriers)),
+            model::Load::Gravity(gravity) => Box::new(Gravity(gravity.clone())),
+            model::Load::BodyForce(force) => Box::new(BodyForce(force.clone())),
+            model::Load::Traction { side, value } => {
+                Box::new(Traction::new(side, value, found.volume))
+            }
+            model::Load::Pressure { value, zone } => {
+                Box::new(Pressure::new(value, zone.as_ref(), cell)?)
+            }
+            model::Load::Manufactured(field) => Box::new(Manufactured::new(field)?),
+        })
+    });
+    made.collect()
+}
+
+/// Force on each point, N: what the points hold themselves (`points.point_force`), and the loads.
+/// Error: one is not finite.
+pub fn on_points<const D: usize>(
+    points: &Points<D>,
+    materials: &[Material],
+    loads: &[Box<dyn Load<D>>],
+    at: Moment,
+) -> Result<Vec<[f64; D]>> {
+    let mut forces: Vec<[f64; D]> =
+        points.point_force.iter().map(|force| force.map(|f| f * at.ramp)).collect();
+    for load in loads {
+        load.add_to_points(points, materials, at, &mut forces)?;
+    }
+    match forces.iter().position(|force| force.iter().any(|f| !f.is_finite())) {
+        None => Ok(forces),
+        Some(p) => Err(Error::Input(format!(
+            "the load on point {} at {:?} is not finite ({:?} N at s = {}): check the expressions \
+             of [[load]]",
+            points.id[p], points.position[p], forces[p], at.load_factor
+        ))),
+    }
+}
+
+/// Variables of an expression at a point.
+pub fn scope_of<const D: usize>(
+    points: &Points<D>,
+    p: usize,
+    load_factor: f64,
+    time: f64,
+) -> Scope {
+    let mut scope = Scope { load_factor, time, ..Scope::default() };
+    scope.initial[..D].copy_from_slice(&points.position_initial[p]);
+    scope.current[..D].copy_from_slice(&points.position[p]);
+    scope
+}

@@ -3,7 +3,7 @@
 
 use crate::deck::{Deck, Scope, model};
 use crate::error::{Error, Result};
-use crate::loads::point_forces::scope_of;
+use crate::loads::scope_of;
 use crate::material::{Material, local};
 use crate::parallel::World;
 use crate::points::{Named, Points};

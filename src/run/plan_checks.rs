@@ -3,6 +3,7 @@
 use crate::analysis::time_steps::{TimeSteps, stability_limit};
 use crate::deck::model::{Every, Load};
 use crate::deck::rough;
+use crate::loads::Moment;
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
@@ -25,10 +26,12 @@ pub fn weight_ratios<const D: usize>(
     model: &Model<D>,
     points: &Points<D>,
 ) -> Vec<Row> {
+    // As it is at the end of a quasi-static run, and at the start of a dynamic one.
+    let at = Moment::new(model.deck.analysis.kind, 1.0, 0.0);
     let mut gravity = [0.0; D];
     for load in &model.deck.loads {
         if let Load::Gravity(g) = load {
-            gravity.iter_mut().zip(g).for_each(|(sum, g)| *sum += g);
+            gravity.iter_mut().zip(g).for_each(|(sum, g)| *sum += g.value(&at.scope()));
         }
     }
     let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();

@@ -1,12 +1,13 @@
 //! From a checked deck to points on their ranks: seed, partition, migrate, place point forces;
 //! or the same from a checkpoint.
 
+use crate::deck::expression::Expression;
 use crate::deck::model::{self, Initial, Load};
 use crate::deck::{Deck, rough};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
-use crate::loads::manufactured::Manufactured;
+use crate::loads::{self, Found, Manufactured, traction};
 use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
 use crate::parallel::{self, Partition, World};
@@ -37,10 +38,11 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     };
     let seeding = CellByCell::new(&deck, &grid, first_ids)?;
     parallel::settle(world, &partition, &grid, &mut points, cells, &seeding)?;
-    place_point_forces(world, &deck, &grid, &mut points)?;
+    let mut found = find_carriers(world, &deck, &grid, &points)?;
+    hold_constant_forces(&deck, &mut found, &mut points);
     let materials = materials::of_bodies(&deck);
     materials::equip(world, &deck, &materials, &mut points)?;
-    Ok((model_of(world, deck, grid, partition, materials, &points)?, points))
+    Ok((model_of(world, deck, grid, partition, materials, found, &points)?, points))
 }
 
 /// The model and this rank's points as a checkpoint holds them: the stored partition where it
@@ -66,7 +68,10 @@ pub fn restore<const D: usize>(
     materials::equip_restored(world, &deck, &materials, &mut points)?;
     // With the stored partition nothing moves; the points are in the order of their cells.
     parallel::migrate(world, &partition, &grid, &mut points)?;
-    Ok((model_of(world, deck, grid, partition, materials, &points)?, points))
+    let mut found = find_carriers(world, &deck, &grid, &points)?;
+    // The points have brought theirs.
+    hold_constant_forces(&deck, &mut found, &mut Points::<D>::default());
+    Ok((model_of(world, deck, grid, partition, materials, found, &points)?, points))
 }
 
 /// Everything that stays the same while points move. Collective.
@@ -76,6 +81,7 @@ fn model_of<const D: usize>(
     grid: Grid<D>,
     partition: Partition<D>,
     materials: Vec<Material>,
+    found: Vec<Found>,
     points: &Points<D>,
 ) -> Result<Model<D>> {
     let Overview { stiffness, symmetric } = Overview::of(world, &deck, &materials, points);
@@ -94,6 +100,8 @@ fn model_of<const D: usize>(
         _ => None,
     });
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
+    let loads = loads::of_deck(&deck.loads, &found, grid.cell_size())?;
+    let symmetric = symmetric && loads.iter().all(|load| load.symmetric());
     let balance = Balance::default();
     Ok(Model {
         deck,
@@ -103,6 +111,7 @@ fn model_of<const D: usize>(
         penalties,
         stiffness,
         symmetric,
+        loads,
         manufactured,
         balance,
     })
@@ -182,17 +191,31 @@ fn check_bodies<const D: usize>(
     }
 }
 
-/// Shares each point load equally among the points nearest to its places; of points equally
+/// What carries each load of the deck. Each point
+/// load is shared equally among the points nearest to its places; of points equally
 /// near (to 1e-9 of the distance scale) the one with the smallest id takes it. Error: a place further
 /// from all points than the diagonal of a cell and half that of the point's domain.
-fn place_point_forces<const D: usize>(
+fn find_carriers<const D: usize>(
     world: &World,
     deck: &Deck,
     grid: &Grid<D>,
-    points: &mut Points<D>,
-) -> Result<()> {
+    points: &Points<D>,
+) -> Result<Vec<Found>> {
+    let mut all = vec![Found::default(); deck.loads.len()];
     for (index, load) in deck.loads.iter().enumerate() {
-        let Load::Point { body, nearest, force } = load else { continue };
+        if let Load::Traction { side, .. } = load {
+            let layer = (0..points.len()).filter(|&p| traction::carries(side, points, p));
+            all[index].volume = world.sum(layer.map(|p| points.volume_initial[p]).sum());
+            if all[index].volume == 0.0 {
+                let why = format!(
+                    "no point of body \"{}\" has its domain at this side",
+                    deck.bodies[side.body].name
+                );
+                let key = format!("load.{index}.traction.side");
+                return Err(Error::Input(deck.places.say(&key, &why)));
+            }
+        }
+        let Load::Point { body, nearest, .. } = load else { continue };
         for place in nearest {
             let distance = |p: usize| -> f64 {
                 let x = &points.position_initial[p];
@@ -228,12 +251,24 @@ fn place_point_forces<const D: usize>(
                 let key = format!("load.{index}.point.nearest");
                 return Err(Error::Input(deck.places.say(&key, &message)));
             }
-            if let Some(p) = found {
-                for (held, f) in points.point_force[p].iter_mut().zip(force) {
-                    *held += f / nearest.len() as f64;
-                }
+            all[index].carriers.push((id, 1.0 / nearest.len() as f64));
+        }
+    }
+    Ok(all)
+}
+
+/// Gives point forces that hold neither s nor t to the points that carry them, and to them alone.
+fn hold_constant_forces<const D: usize>(deck: &Deck, found: &mut [Found], points: &mut Points<D>) {
+    for (load, found) in deck.loads.iter().zip(found) {
+        let Load::Point { nearest, force, .. } = load else { continue };
+        if force.iter().any(Expression::depends_on_time) {
+            continue;
+        }
+        for (id, _) in std::mem::take(&mut found.carriers) {
+            let Some(p) = points.id.iter().position(|own| *own == id) else { continue };
+            for (held, f) in points.point_force[p].iter_mut().zip(force) {
+                *held += f.as_constant().unwrap_or(f64::NAN) / nearest.len() as f64;
             }
         }
     }
-    Ok(())
 }

@@ -5,8 +5,7 @@ use crate::deck::model::Tangent;
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::grid::Grid;
-use crate::loads::manufactured::Manufactured;
-use crate::loads::point_forces;
+use crate::loads::{self, Load, Manufactured, Moment};
 use crate::material::Material;
 use crate::parallel::balance::Balance;
 use crate::parallel::{Partition, World};
@@ -23,8 +22,10 @@ pub struct Model<const D: usize> {
     pub penalties: Vec<Penalty>,
     /// Mean stiffness scale of each body, Pa: what Ghost stiffness and penalties are factors of.
     pub stiffness: Vec<f64>,
-    /// Whether the tangent of every material is symmetric in every state.
+    /// Whether the tangents of all materials and loads are symmetric in every state.
     pub symmetric: bool,
+    /// In the order of the deck.
+    pub loads: Vec<Box<dyn Load<D>>>,
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
     pub balance: Balance,
@@ -50,14 +51,7 @@ impl<const D: usize> Model<D> {
         load_factor: f64,
         time: f64,
     ) -> Result<Vec<[f64; D]>> {
-        world.fail_together(point_forces::point_forces(
-            points,
-            &self.materials,
-            &self.deck.loads,
-            self.manufactured.as_ref(),
-            self.deck.analysis.kind,
-            load_factor,
-            time,
-        ))
+        let at = Moment::new(self.deck.analysis.kind, load_factor, time);
+        world.fail_together(loads::on_points(points, &self.materials, &self.loads, at))
     }
 }

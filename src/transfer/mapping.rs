@@ -5,6 +5,8 @@
 
 use std::ops::Range;
 
+use crate::basis::Influences;
+use crate::system::numbering::Numbering;
 use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 use crate::tensor::dense;
@@ -110,6 +112,27 @@ pub fn add_momentum_and_force<const D: usize>(
             }
         }
     }
+}
+
+/// Σ_p S^T f at the local nodes, `D` values each.
+pub fn forces_at_nodes<const D: usize>(
+    numbering: &Numbering,
+    influences: &Influences<D>,
+    forces: &[[f64; D]],
+) -> Vec<f64> {
+    let mut nodal = vec![0.0; numbering.len() * D];
+    for (p, force) in forces.iter().enumerate() {
+        if force.iter().all(|&f| f == 0.0) {
+            continue;
+        }
+        for entry in influences.offsets[p]..influences.offsets[p + 1] {
+            let local = numbering.index[influences.nodes[entry]] as usize;
+            for (axis, f) in force.iter().enumerate() {
+                nodal[local * D + axis] += influences.weights[entry] * f;
+            }
+        }
+    }
+    nodal
 }
 
 /// Rates S a and velocities of the points.

@@ -1,5 +1,6 @@
 //! f(a) with grad f = f' grad a and Hess f = f' Hess a + f'' grad a (x) grad a: values that carry
 //! their first and second derivatives with respect to X, Y, Z (forward automatic differentiation).
+//! `max`, `min` and `abs` have derivatives once they are averaged over a width.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 use std::str::FromStr;
@@ -17,6 +18,9 @@ pub struct Jet {
     pub first: [f64; 3],
     /// XX, XY, XZ, YY, YZ, ZZ; see [`Jet::second_along`].
     second: [f64; 6],
+    /// Half widths along the axes, m, over which [`Jet::max`] and its kin are averaged. Zero: they
+    /// are what they are, with the derivatives of one side.
+    pub reach: [f64; 3],
 }
 
 impl Jet {
@@ -28,7 +32,12 @@ impl Jet {
     pub fn coordinate(value: f64, axis: usize) -> Self {
         let mut first = [0.0; 3];
         first[axis] = 1.0;
-        Jet { value, first, second: [0.0; 6] }
+        Jet { value, first, ..Jet::default() }
+    }
+
+    /// The same with another [`Jet::reach`].
+    pub fn within(self, reach: [f64; 3]) -> Self {
+        Jet { reach, ..self }
     }
 
     /// d2/dX_i dX_j.
@@ -38,7 +47,7 @@ impl Jet {
 
     /// f(self), from f, f' and f'' at the value.
     pub fn apply(self, [f, slope, curvature]: [f64; 3]) -> Self {
-        let mut out = Jet { value: f, ..Jet::default() };
+        let mut out = Jet { value: f, reach: self.reach, ..Jet::default() };
         for axis in 0..3 {
             out.first[axis] = slope * self.first[axis];
         }
@@ -51,6 +60,37 @@ impl Jet {
 
     fn is_constant(&self) -> bool {
         self.first == [0.0; 3] && self.second == [0.0; 6]
+    }
+
+    fn wider(self, other: Self) -> [f64; 3] {
+        std::array::from_fn(|axis| self.reach[axis].max(other.reach[axis]))
+    }
+
+    /// max(self, other), averaged over -w to w of their difference d, w = Σ_i |d,_i| reach_i:
+    /// other + (d + w)^2 / 4w between. Where d varies linearly along one axis, this is the mean over
+    /// the width along it.
+    pub fn max(self, other: Self) -> Self {
+        let d = self - other;
+        let width: f64 = d.first.iter().zip(d.reach).map(|(slope, r)| slope.abs() * r).sum();
+        match d.value {
+            v if v >= width => Jet { reach: d.reach, ..self },
+            v if v <= -width => Jet { reach: d.reach, ..other },
+            v => {
+                let above = v + width;
+                let ramp = [above * above / (4.0 * width), above / (2.0 * width), 0.5 / width];
+                other + d.apply(ramp)
+            }
+        }
+    }
+
+    /// min(self, other), as [`Jet::max`].
+    pub fn min(self, other: Self) -> Self {
+        -(-self).max(-other)
+    }
+
+    /// |self|, as [`Jet::max`].
+    pub fn abs(self) -> Self {
+        self.max(-self)
     }
 
     fn reciprocal(self) -> Self {
@@ -105,6 +145,7 @@ impl Add for Jet {
             value: self.value + other.value,
             first: std::array::from_fn(|i| self.first[i] + other.first[i]),
             second: std::array::from_fn(|i| self.second[i] + other.second[i]),
+            reach: self.wider(other),
         }
     }
 }
@@ -113,7 +154,12 @@ impl Neg for Jet {
     type Output = Self;
 
     fn neg(self) -> Self {
-        Jet { value: -self.value, first: self.first.map(|d| -d), second: self.second.map(|d| -d) }
+        Jet {
+            value: -self.value,
+            first: self.first.map(|d| -d),
+            second: self.second.map(|d| -d),
+            reach: self.reach,
+        }
     }
 }
 
@@ -142,6 +188,7 @@ impl Mul for Jet {
                     + a.first[i] * b.first[j]
                     + a.first[j] * b.first[i]
             }),
+            reach: self.wider(other),
         }
     }
 }

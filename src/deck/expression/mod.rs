@@ -163,7 +163,13 @@ impl Expression {
     /// not smooth (comparisons, `min`, `max`, `if`, `abs`, ...).
     pub fn smooth(&self) -> Result<Smooth, String> {
         let normal = grammar::normalise(&self.text)?;
-        Smooth::parse(&normal).map_err(|why| format!("\"{}\": {why}", self.text))
+        Smooth::parse(&normal, false).map_err(|why| format!("\"{}\": {why}", self.text))
+    }
+
+    /// As [`Self::smooth`], with `min`, `max` and `abs` averaged over a width.
+    pub fn averaged(&self) -> Result<Smooth, String> {
+        let normal = grammar::normalise(&self.text)?;
+        Smooth::parse(&normal, true).map_err(|why| format!("\"{}\": {why}", self.text))
     }
 
     fn from_normal_form(text: String, normal: &str) -> Result<Self, String> {

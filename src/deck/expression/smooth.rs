@@ -15,11 +15,18 @@ pub struct Smooth {
 
 impl Smooth {
     /// From the fully parenthesised form. Error: an operator or function without a rule.
-    pub(crate) fn parse(normal: &str) -> Result<Self, String> {
-        if let Some(name) = without_rule(normal) {
+    /// `averaged`: functions with a kink are allowed.
+    pub(crate) fn parse(normal: &str, averaged: bool) -> Result<Self, String> {
+        let kinked: &[&str] = if averaged { &KINKED } else { &[] };
+        if let Some(name) = without_rule(normal, kinked) {
             return Err(format!(
                 "`{name}` has no derivative rule; use + - * / ^ atan2 {}",
-                RULES.map(|(name, _)| name).join(" ")
+                RULES
+                    .map(|(name, _)| name)
+                    .into_iter()
+                    .chain(kinked.iter().copied())
+                    .collect::<Vec<_>>()
+                    .join(" ")
             ));
         }
         let flat = FlatEx::parse(normal).map_err(|error| error.to_string())?;
@@ -33,14 +40,24 @@ impl Smooth {
 
     /// The value and its derivatives with respect to X, Y, Z; x, y, z, s and t count as constant.
     pub fn jet(&self, scope: &Scope) -> Jet {
+        use Variable::{InitialX, InitialY, InitialZ};
+        self.evaluate(scope, [InitialX, InitialY, InitialZ], [0.0; 3])
+    }
+
+    /// The value and its derivatives with respect to x, y, z; all others count as constant. Functions
+    /// with a kink are averaged over `reach` to either side, m.
+    pub fn jet_of_current(&self, scope: &Scope, reach: [f64; 3]) -> Jet {
+        use Variable::{CurrentX, CurrentY, CurrentZ};
+        self.evaluate(scope, [CurrentX, CurrentY, CurrentZ], reach)
+    }
+
+    fn evaluate(&self, scope: &Scope, axes: [Variable; 3], reach: [f64; 3]) -> Jet {
         let mut values = [Jet::default(); Variable::ALL.len()];
         for (value, &variable) in values.iter_mut().zip(&self.variables) {
             let number = scope.value(variable);
-            *value = match variable {
-                Variable::InitialX => Jet::coordinate(number, 0),
-                Variable::InitialY => Jet::coordinate(number, 1),
-                Variable::InitialZ => Jet::coordinate(number, 2),
-                _ => Jet::constant(number),
+            *value = match axes.iter().position(|axis| *axis == variable) {
+                Some(axis) => Jet::coordinate(number, axis).within(reach),
+                None => Jet::constant(number),
             };
         }
         let nowhere = Jet::constant(f64::NAN);
@@ -49,7 +66,7 @@ impl Smooth {
 }
 
 /// The first operator or function of a normal form that has no derivative everywhere.
-fn without_rule(normal: &str) -> Option<String> {
+fn without_rule(normal: &str, kinked: &[&str]) -> Option<String> {
     const SYMBOLS: [&str; 9] = ["<=", ">=", "==", "!=", "<", ">", "&&", "||", "!"];
     if normal.contains(super::operators::THEN) {
         return Some("if".to_string());
@@ -62,10 +79,13 @@ fn without_rule(normal: &str) -> Option<String> {
     let mut functions = words.filter(|word| {
         word.starts_with(|c: char| c.is_ascii_alphabetic()) && Variable::from_name(word).is_none()
     });
-    functions.find(|word| !smooth(word)).map(str::to_string)
+    functions.find(|word| !smooth(word) && !kinked.contains(word)).map(str::to_string)
 }
 
-/// The smooth ones of the deck's operators, on jets.
+/// Functions with a kink: smooth once they are averaged over a width.
+const KINKED: [&str; 3] = ["max", "min", "abs"];
+
+/// The smooth ones of the deck's operators, and those with a kink, on jets.
 #[derive(Clone, Debug)]
 struct JetOperators;
 
@@ -80,6 +100,9 @@ impl MakeOperators<Jet> for JetOperators {
             Operator::make_bin("/", binary(|a, b| a / b)),
             Operator::make_bin("^", binary(Jet::power)),
             Operator::make_bin("atan2", binary(Jet::atan2)),
+            Operator::make_bin("max", binary(Jet::max)),
+            Operator::make_bin("min", binary(Jet::min)),
+            Operator::make_unary("abs", Jet::abs),
         ];
         operators.extend(unary());
         operators

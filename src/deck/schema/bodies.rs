@@ -172,15 +172,57 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "load",
         header: "[[load]]",
-        doc: "One of the four.",
+        doc: "Exactly one of the keys. Values are numbers or expressions. In quasi-static analyses a value that holds neither s nor t grows with s; one that holds s or t is taken as it is.",
         keys: &[
             key("point", Table("load.point"), Optional("-"), "Force held by material points."),
-            key("gravity", Vector, Optional("-"), "Acceleration.").unit("m/s2"),
+            key("gravity", Expressions("X Y Z s t"), Optional("-"), "Acceleration.").unit("m/s2"),
             key("body_force", Expressions("X Y Z x y z s t"), Optional("-"),
-                "Force per initial volume; without s or t ramped in quasi-static analyses.")
+                "Force per initial volume.")
                 .unit("N/m3"),
+            key("pressure", Table("load.pressure"), Optional("-"),
+                "Pressure on the surface of all bodies, in the current state."),
+            key("traction", Table("load.traction"), Optional("-"),
+                "Dead load per initial area on a side of a body."),
             key("manufactured", Expressions("X Y Z s"), Optional("-"),
                 "The body force that makes this displacement field exact.").unit("m"),
+        ],
+    },
+    Section {
+        name: "load.traction",
+        header: "load.traction",
+        doc: "Keeps its direction and its total, whatever the body does. The body's outermost points at the side carry it, each by its share of the area: half a point's domain below the surface, so that stresses in the outermost cells are not those of a surface load.",
+        keys: &[
+            key("body", Text, Optional("the only body"), "Name of a body whose shape is a box along the axes."),
+            key("side", Choice(SIDES), Required, "Its side at the start."),
+            key("value", Expressions("X Y Z s t"), Required, "Force per initial area.").unit("Pa"),
+        ],
+    },
+    Section {
+        name: "load.pressure",
+        header: "load.pressure",
+        doc: "Acts along the inward normal of every surface, and follows the motion; on a surface that is held, the reaction takes it. It is a sum over the points (virtual stress), which needs no surface: what it pushes is where the points' volume ends. `max`, `min` and `abs` are averaged over a point's domain. Water up to level 8: value = \"max(0, 9.81e3*(8-y))\".",
+        keys: &[
+            key("value", Expression("x y z s t"), Required, "Compression positive; a formula has derivatives (no `if`, no comparisons).").unit("Pa"),
+            key("where", Table("load.pressure.where"), Optional("everywhere"),
+                "A part of the surfaces."),
+        ],
+    },
+    Section {
+        name: "load.pressure.where",
+        header: "load.pressure.where",
+        doc: "The pressure acts in full inside a box, and falls smoothly to zero outside: surfaces within that width are pushed too, by less. The fall lies inside the body, too, where points that are too few for it show as an error of the force: 3e-4 with three cells of 2 points a side. A fade of less than a cell is not resolved.",
+        keys: &[
+            key("box", Table("load.pressure.where.box"), Required, "In current positions."),
+            key("fade", Number, Optional("three cells"), "Width of the fall.").unit("m").range(POSITIVE),
+        ],
+    },
+    Section {
+        name: "load.pressure.where.box",
+        header: "load.pressure.where.box",
+        doc: "A plane where min equals max.",
+        keys: &[
+            key("min", Vector, Required, "Lower corner.").unit("m"),
+            key("max", Vector, Required, "Upper corner.").unit("m"),
         ],
     },
     Section {
@@ -190,7 +232,7 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             key("body", Text, Optional("the only body"), "Name of the body."),
             key("nearest", Points, Required, "Places, one point each: the nearest, at most the diagonal of a cell (and half that of its domain) away.").unit("m"),
-            key("force", Vector, Required, "Total force (per metre in plane strain).").unit("N"),
+            key("force", Expressions("s t"), Required, "Total force (per metre in plane strain).").unit("N"),
         ],
     },
 ];

@@ -2,10 +2,15 @@
 
 use super::bodies::{self, World};
 use super::shapes;
-use crate::deck::model::{Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, Rotation};
+use crate::deck::expression::Variable;
+use crate::deck::model::{
+    Body, BodySide, BodySource, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone,
+    Rotation,
+};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, SIDES};
+use crate::deck::shape::Form;
 
 pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got<Vec<Boundary>> {
     let mut names: Vec<String> = Vec::new();
@@ -104,6 +109,47 @@ fn body(table: &Table<'_>, key: &'static str, bodies: &[String]) -> Got<usize> {
         .ok_or_else(|| table.unknown_word(key, &name, &known, table.origin(key)))
 }
 
+fn traction(
+    table: &Table<'_>,
+    dimension: usize,
+    names: &[String],
+    read: Option<&[Body]>,
+) -> Got<Load> {
+    let body = of_body(table, names);
+    let side = table.choice_of("side", &SIDES[..2 * dimension]);
+    let value = table.expressions_if("value", dimension)?;
+    let (body, side) = (body?, side?);
+    let value = value.ok_or_else(|| table.missing("value", ""))?;
+    let (axis, upper) = (side / 2, side % 2 == 1);
+    // Bodies with faults of their own have been told of.
+    let Some(read) = read else {
+        let side = BodySide { body, axis, upper, at: 0.0, area: 0.0 };
+        return Ok(Load::Traction { side, value });
+    };
+    let shape = match &read[body].source {
+        BodySource::Shape { shape, .. } if shape.placement.rotate.is_none() => Some(shape),
+        _ => None,
+    };
+    let Some((shape, Form::Box { min, max })) = shape.map(|shape| (shape, &shape.form)) else {
+        let what = format!("body \"{}\" is not a box along the axes, which has sides", names[body]);
+        let help = "use pressure, which needs no sides, or give the body as a box";
+        return Err(table.problem_with_help("side", what, help));
+    };
+    let corner = if upper { max } else { min };
+    let at = corner[axis] + shape.placement.translate.get(axis).copied().unwrap_or(0.0);
+    let area = (0..dimension).filter(|&a| a != axis).map(|a| max[a] - min[a]).product();
+    Ok(Load::Traction { side: BodySide { body, axis, upper, at, area }, value })
+}
+
+/// The body that key `body` names, or the only one.
+fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
+    match (table.given("body"), names) {
+        (false, [_]) => Ok(0),
+        (false, _) => Err(table.missing("body", "the deck has several bodies")),
+        (true, _) => body(table, "body", names),
+    }
+}
+
 /// `read`: the bodies as read, if that succeeded; `names`: as written.
 pub fn loads(
     root: &Table<'_>,
@@ -113,32 +159,38 @@ pub fn loads(
 ) -> Got<Vec<Load>> {
     let dimension = world.dimension;
     root.tables("load", |_, table| {
-        let key = table.one_of(&["point", "gravity", "body_force", "manufactured"])?;
+        let key = table.one_of(&[
+            "point",
+            "gravity",
+            "body_force",
+            "pressure",
+            "traction",
+            "manufactured",
+        ])?;
         match key {
             "point" => table.table("point", |t| {
-                let body = match (t.given("body"), names) {
-                    (false, [_]) => Ok(0),
-                    (false, _) => Err(t.missing("body", "the deck has several bodies")),
-                    (true, _) => body(&t, "body", names),
-                };
+                let body = of_body(&t, names);
                 let (nearest, force) =
-                    (t.points("nearest", dimension), t.vector("force", dimension));
-                let nearest = nearest?;
+                    (t.points("nearest", dimension), t.expressions_if("force", dimension));
+                let (nearest, force) = (nearest?, force?);
+                let force = force.ok_or_else(|| t.missing("force", ""));
                 if nearest.is_empty() {
                     return Err(t.problem("nearest", "expected one or more positions, found none"));
                 }
                 Ok(Load::Point { body: body?, nearest, force: force? })
             }),
             "gravity" => {
-                let gravity = table.vector("gravity", dimension)?;
+                let gravity = table.expressions_if("gravity", dimension)?;
+                let gravity = gravity.ok_or_else(|| table.missing("gravity", ""))?;
+                let acts = gravity.iter().any(|g| g.as_constant() != Some(0.0));
                 let weightless = read.is_some_and(|all| all.iter().all(|b| b.density == 0.0));
-                if weightless && gravity.iter().any(|g| *g != 0.0) {
+                if weightless && acts {
                     return Err(
                         table.problem("gravity", "acts on nothing: every body has density 0")
                     );
                 }
                 if let (Some(all), Some(light)) = (read, bodies::without_density(root))
-                    && gravity.iter().any(|g| *g != 0.0)
+                    && acts
                 {
                     let name = &all[light].name;
                     let what = format!("body \"{name}\" has no density, and others have one");
@@ -147,6 +199,23 @@ pub fn loads(
                 }
                 Ok(Load::Gravity(gravity))
             }
+            "traction" => table.table("traction", |t| traction(&t, dimension, names, read)),
+            "pressure" => table.table("pressure", |t| {
+                let value = t.expression_if("value");
+                let zone = t.table_if("where", |t| {
+                    let corners = t.table("box", |t| shapes::corners(&t, dimension, true));
+                    let ((min, max), fade) = (corners?, t.number_if("fade")?);
+                    Ok(PressureZone { min, max, fade })
+                });
+                let value = value?.ok_or_else(|| t.missing("value", ""))?;
+                if dimension == 2 && value.depends_on(Variable::CurrentZ) {
+                    return Err(t.problem("value", "z is not known here: the problem is 2D"));
+                }
+                if let Err(why) = value.averaged() {
+                    return Err(t.problem("value", why));
+                }
+                Ok(Load::Pressure { value, zone: zone? })
+            }),
             _ => {
                 let all = table.expressions_if(key, dimension)?;
                 let all = all.ok_or_else(|| table.missing(key, ""))?;

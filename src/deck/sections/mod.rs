@@ -68,8 +68,8 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         });
         grid_problems?;
     }
-    if let (Ok(analysis), Ok(boundaries)) = (&analysis, &boundaries) {
-        restraint::check(&root, analysis, boundaries, dimension)?;
+    if let (Ok(analysis), Ok(boundaries), Ok(loads)) = (&analysis, &boundaries, &loads) {
+        restraint::check(&root, analysis, (boundaries, loads), dimension)?;
     }
     let (analysis, method) = (analysis?, method?);
     let ghost = ghost?.in_force(analysis.kind, method.mass);

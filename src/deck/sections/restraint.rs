@@ -1,6 +1,6 @@
 //! Whether boundary conditions hold the bodies: a quasi-static system without them is singular.
 
-use crate::deck::model::{Analysis, AnalysisType, Boundary};
+use crate::deck::model::{Analysis, AnalysisType, Boundary, Load};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::AXES;
@@ -10,18 +10,20 @@ use crate::deck::tree::Origin;
 pub fn check(
     root: &Table<'_>,
     analysis: &Analysis,
-    boundaries: &[Boundary],
+    (boundaries, loads): (&[Boundary], &[Load]),
     dimension: usize,
 ) -> Got<()> {
     if analysis.kind != AnalysisType::QuasiStatic {
         return Ok(());
     }
     let held = |axis: usize| {
-        boundaries.iter().any(|boundary| {
-            boundary.fix.contains(&axis)
-                || boundary.displacement.iter().any(|(component, _)| *component == axis)
-                || (boundary.rotation.is_some() && axis < 2)
-        })
+        let floats = loads.iter().any(|load| load.may_hold(axis));
+        floats
+            || boundaries.iter().any(|boundary| {
+                boundary.fix.contains(&axis)
+                    || boundary.displacement.iter().any(|(component, _)| *component == axis)
+                    || (boundary.rotation.is_some() && axis < 2)
+            })
     };
     let free: Vec<&str> =
         (0..dimension).filter(|axis| !held(*axis)).map(|axis| AXES[axis]).collect();

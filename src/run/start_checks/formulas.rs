@@ -1,12 +1,14 @@
 //! What the state at the start shows of a deck: formulas without a value there, and conditions that
 //! act on nothing. Found before anything is solved or written.
 
+use crate::deck::Scope;
 use crate::deck::figure;
 use crate::deck::model::{AnalysisType, Deck, Load, Place};
 use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
-use crate::loads::point_forces::scope_of;
+use crate::loads::pressure::PressureAt;
+use crate::loads::{Moment, scope_of};
 use crate::material::local;
 use crate::parallel::World;
 use crate::points::Points;
@@ -68,8 +70,24 @@ fn loads<const D: usize>(
     let ends = [(span.factor_start, span.time_start), (span.factor_end, span.time_end)];
     for (index, load) in deck.loads.iter().enumerate() {
         let message = match load {
-            Load::Point { .. } | Load::Gravity(_) => None,
-            Load::BodyForce(force) => {
+            Load::Point { force, .. } => ends.into_iter().find_map(|(s, t)| {
+                let scope = Scope { load_factor: s, time: t, ..Scope::default() };
+                let axis = force.iter().position(|f| !f.value(&scope).is_finite())?;
+                Some(deck.places.say(
+                    &format!("load.{index}.point.force"),
+                    &format!(
+                        "{} is {} N at s = {s}, t = {t} s: the expression is not finite there",
+                        AXES[axis],
+                        force[axis].value(&scope)
+                    ),
+                ))
+            }),
+            Load::Gravity(force) | Load::BodyForce(force) | Load::Traction { value: force, .. } => {
+                let (key, unit) = match load {
+                    Load::Gravity(_) => ("gravity", "m/s2"),
+                    Load::Traction { .. } => ("traction.value", "Pa"),
+                    _ => ("body_force", "N/m3"),
+                };
                 let fault = |p: usize| {
                     ends.into_iter().find_map(|(s, t)| {
                         let scope = scope_of(points, p, s, t);
@@ -81,11 +99,32 @@ fn loads<const D: usize>(
                 of_first_point(world, points, fault, |p, (axis, value, s, t)| {
                     let t = if kind.has_time() { format!(", t = {t} s") } else { String::new() };
                     deck.places.say(
-                        &format!("load.{index}.body_force"),
+                        &format!("load.{index}.{key}"),
                         &format!(
-                            "{} is {value} N/m3 at {}, s = {s}{t}: the expression is not finite \
+                            "{} is {value} {unit} at {}, s = {s}{t}: the expression is not finite \
                              there",
                             AXES[axis],
+                            place(points, p)
+                        ),
+                    )
+                })
+            }
+            Load::Pressure { .. } => {
+                let Some(pressure) = model.loads[index].pressure() else { continue };
+                let fault = |p: usize| {
+                    ends.into_iter().find_map(|(s, t)| {
+                        let mut found = PressureAt::<D>::default();
+                        let (x, reach) = (&points.position[p], &points.half_length[p]);
+                        pressure.add_at(x, reach, Moment::new(kind, s, t), &mut found);
+                        (!found.is_finite()).then_some((found.value, s))
+                    })
+                };
+                of_first_point(world, points, fault, |p, (value, s)| {
+                    deck.places.say(
+                        &format!("load.{index}.pressure.value"),
+                        &format!(
+                            "is {value} Pa at {}, s = {s}: the expression or a derivative of it \
+                             is not finite there",
                             place(points, p)
                         ),
                     )

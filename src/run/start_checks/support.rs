@@ -53,7 +53,10 @@ pub fn falls<const D: usize>(
     let mut pulled = [false; D];
     for load in &model.deck.loads {
         if let Load::Gravity(gravity) = load {
-            pulled.iter_mut().zip(gravity).for_each(|(pulled, g)| *pulled |= *g != 0.0);
+            pulled
+                .iter_mut()
+                .zip(gravity)
+                .for_each(|(pulled, g)| *pulled |= g.as_constant() != Some(0.0));
         }
     }
     if !pulled.contains(&true) {
@@ -101,6 +104,9 @@ fn loose<const D: usize>(
         &deck.boundaries,
         first,
     )?;
+    // Water that holds a body along an axis mostly rights it, too.
+    let springs: [bool; D] =
+        std::array::from_fn(|axis| deck.loads.iter().any(|load| load.may_hold(axis)));
     let pieces = pieces::labels(world, grid, populated, &faces, numbering)?;
     let (middle, length) = extent(world, points);
     let motions = D + D * (D - 1) / 2;
@@ -109,7 +115,8 @@ fn loose<const D: usize>(
         let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
         let x = grid.node_position(numbering.nodes[local]);
         let x: [f64; D] = std::array::from_fn(|a| (x[a] - middle[a]) / length);
-        for component in (0..D).filter(|c| conditions.fixed[local * D + c]) {
+        let held = |&c: &usize| conditions.fixed[local * D + c] || springs[c];
+        for component in (0..D).filter(held) {
             let row = motions_at(&x, component);
             for (i, a) in row.iter().enumerate() {
                 for (j, b) in row.iter().enumerate() {

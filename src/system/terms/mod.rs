@@ -5,12 +5,14 @@
 //! |---|---|---|
 //! | what each of them says of itself | `term.rs` | |
 //! | internal force and tangent stiffness of the points | `stress.rs` | Lagrangian eq. 27, 28 |
+//! | pressures by virtual stress | `pressure.rs` | Given et al. 2024 |
 //! | Ghost stiffness | `ghost.rs` | Ghost eq. 27, 28 |
 //! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
 //! | products of the last two | `scalar.rs` | |
 
 pub mod ghost;
 pub mod inertia;
+pub mod pressure;
 mod scalar;
 pub mod stress;
 pub mod term;

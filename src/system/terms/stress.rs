@@ -305,10 +305,7 @@ pub(crate) fn respond<const D: usize>(
         state: points.state.of(p, points.body[p]),
         deformation_gradient: &points.deformation_gradient[p],
         elastic_excess: &points.elastic_excess[p],
-        volume_initial: match step.volume {
-            PointVolume::Deformation => points.volume_initial[p],
-            PointVolume::Domain => domain_volume(points, p),
-        },
+        volume_initial: start_volume(step, p),
     };
     let (contribution, state) = mechanics::contribution(frame, &start, increment);
     if dense::determinant(&dense::plus_unit(increment)) <= 0.0 {
@@ -319,6 +316,15 @@ pub(crate) fn respond<const D: usize>(
         return None;
     }
     Some(contribution)
+}
+
+/// The initial volume that forces of point `p` are integrated over, m3.
+#[inline(always)]
+pub(crate) fn start_volume<const D: usize>(step: StepPoints<'_, D>, p: usize) -> f64 {
+    match step.volume {
+        PointVolume::Deformation => step.points.volume_initial[p],
+        PointVolume::Domain => domain_volume(step.points, p),
+    }
 }
 
 /// The initial volume of which det F makes that of the domain at the step's start, m3.

@@ -1,0 +1,206 @@
+//! f_I = -Σ_p V (p ∇S_I + S_I ∇p): pressures on the bodies' surfaces by virtual stress
+//! ([`crate::loads::pressure`]), at the current state of an iteration.
+//!
+//! With g = ∇S at the current state, V = J V0, q = ∇p and H = ∇∇p at the current place x + S u,
+//! the tangent of -f is
+//! K_aibk = V [p (g_ai g_bk - g_ak g_bi) + g_ai q_k S_b + S_a q_i g_bk + S_a H_ik S_b].
+//! It equals its transposed: -f is the gradient of Σ V p. All state is that of the iterate, so that
+//! the frame in which stresses are written does not matter.
+
+use std::ops::Range;
+
+use crate::error::Result;
+use crate::loads::Moment;
+use crate::loads::pressure::{Pressure, PressureAt};
+use crate::parallel::World;
+use crate::system::model::Model;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::{BlockMatrix, BlockRows};
+use crate::system::step_system::Discretisation;
+use crate::tensor::dense;
+
+use super::stress::{StepPoints, displacement_gradient, start_volume};
+use super::term::{At, Part};
+
+/// The pressures of a deck at one moment.
+pub struct PressureTerm<'a> {
+    pressures: Vec<&'a Pressure>,
+    at: Moment,
+}
+
+impl<'a> PressureTerm<'a> {
+    /// `None` where the deck has no pressure.
+    pub fn new<const D: usize>(model: &'a Model<D>, load_factor: f64, time: f64) -> Option<Self> {
+        let at = Moment::new(model.deck.analysis.kind, load_factor, time);
+        let pressures: Vec<_> = model.loads.iter().filter_map(|load| load.pressure()).collect();
+        (!pressures.is_empty()).then_some(PressureTerm { pressures, at })
+    }
+
+    /// Adds this rank's shares of the force at an iterate, and the tangent of its negative where there
+    /// are `rows`.
+    pub fn add_shares<const D: usize, R: BlockRows<D>>(
+        &self,
+        step: StepPoints<'_, D>,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        rows: Option<&mut R>,
+    ) {
+        let which = match part {
+            Part::Reaching => &step.border.reaching,
+            Part::Inner => &step.border.inner,
+        };
+        self.assemble_groups(step, which, at.pattern, at.displacement, force, rows);
+    }
+
+    /// Adds the force of some groups' points at the local nodes, N, for the nodal increments
+    /// `displacement` (local), and the tangent of its negative where `rows` are given.
+    fn assemble_groups<const D: usize, R: BlockRows<D>>(
+        &self,
+        step: StepPoints<'_, D>,
+        which: &[Range<usize>],
+        pattern: &Pattern,
+        displacement: &[f64],
+        force: &mut [f64],
+        mut rows: Option<&mut R>,
+    ) {
+        let mut block = Vec::new();
+        for group in which.iter().cloned().flatten() {
+            let nodes = step.nodes_of_group(group);
+            block.clear();
+            if rows.is_some() {
+                block.resize(nodes.len() * nodes.len() * D * D, 0.0);
+            }
+            let mut acts = false;
+            for &p in step.groups.points(group) {
+                acts |= self.add_point(step, p, nodes, displacement, force, &mut block);
+            }
+            if let Some(rows) = rows.as_deref_mut().filter(|_| acts) {
+                add_block(pattern, group, nodes, &block, rows);
+            }
+        }
+    }
+
+    /// False if nothing acts on the point.
+    fn add_point<const D: usize>(
+        &self,
+        step: StepPoints<'_, D>,
+        p: usize,
+        nodes: &[u32],
+        displacement: &[f64],
+        force: &mut [f64],
+        block: &mut [f64],
+    ) -> bool {
+        let points = step.points;
+        let row = step.influences.row(p);
+        let weights = &step.influences.weights[row.clone()];
+        let moved = |a: usize| -> [f64; D] {
+            std::array::from_fn(|i| displacement[nodes[a] as usize * D + i])
+        };
+        let mut x = points.position[p];
+        for (a, weight) in weights.iter().enumerate() {
+            let u = moved(a);
+            for i in 0..D {
+                x[i] += weight * u[i];
+            }
+        }
+        let mut found = PressureAt::<D>::default();
+        for pressure in &self.pressures {
+            pressure.add_at(&x, &points.half_length[p], self.at, &mut found);
+        }
+        if found.is_zero() {
+            return false;
+        }
+        let increment = displacement_gradient(&step.influences.gradients[row.clone()], moved);
+        let (inverse, determinant) = dense::inverse(&dense::plus_unit(&increment));
+        let volume =
+            determinant * points.deformation_gradient[p].determinant() * start_volume(step, p);
+        let gradients: Vec<[f64; D]> = step.influences.gradients[row]
+            .iter()
+            .map(|g| std::array::from_fn(|i| (0..D).map(|j| g[j] * inverse[j][i]).sum()))
+            .collect();
+        let (value, slope) = (volume * found.value, found.first.map(|q| volume * q));
+        for (a, (weight, gradient)) in weights.iter().zip(&gradients).enumerate() {
+            for i in 0..D {
+                force[nodes[a] as usize * D + i] -= value * gradient[i] + weight * slope[i];
+            }
+        }
+        if block.is_empty() {
+            return true;
+        }
+        let curvature = found.second.map(|line| line.map(|h| volume * h));
+        let count = nodes.len();
+        for (a, (of_a, g)) in weights.iter().zip(&gradients).enumerate() {
+            for i in 0..D {
+                let line = &mut block[(a * D + i) * count * D..(a * D + i + 1) * count * D];
+                for (b, (of_b, h)) in weights.iter().zip(&gradients).enumerate() {
+                    for k in 0..D {
+                        line[b * D + k] += value * (g[i] * h[k] - g[k] * h[i])
+                            + g[i] * slope[k] * of_b
+                            + of_a * slope[i] * h[k]
+                            + of_a * curvature[i][k] * of_b;
+                    }
+                }
+            }
+        }
+        true
+    }
+
+    /// This rank's share of the force at the local nodes at the step's start, N.
+    pub fn at_start<const D: usize>(
+        &self,
+        step: StepPoints<'_, D>,
+        pattern: &Pattern,
+        nodes: usize,
+    ) -> Vec<f64> {
+        let (still, mut force) = (vec![0.0; nodes * D], vec![0.0; nodes * D]);
+        for part in [Part::Reaching, Part::Inner] {
+            let at = At { pattern, displacement: &still };
+            self.add_shares(step, part, at, &mut force, None::<&mut BlockMatrix<D>>);
+        }
+        force
+    }
+
+    /// [`Self::at_start`] of all ranks at the owned nodes. Collective.
+    pub fn owned_at_start<const D: usize>(
+        &self,
+        world: &World,
+        mesh: &Discretisation<D>,
+        step: StepPoints<'_, D>,
+    ) -> Result<Vec<f64>> {
+        let numbering = &mesh.numbering;
+        let mut force = self.at_start(step, &mesh.pattern, numbering.len());
+        numbering.halo.reverse_add(world, &mut force, D)?;
+        force.truncate(numbering.owned * D);
+        Ok(force)
+    }
+}
+
+/// Adds the dense matrix of a group: entry (a, i, b, k) at ((a D + i) nodes + b) D + k.
+fn add_block<const D: usize, R: BlockRows<D>>(
+    pattern: &Pattern,
+    group: usize,
+    nodes: &[u32],
+    block: &[f64],
+    rows: &mut R,
+) {
+    let (place, count) = (pattern.places.of(group), nodes.len());
+    let runs = count / place.run;
+    for (a, &node) in nodes.iter().enumerate() {
+        let row = pattern.row_of[node as usize] as usize;
+        rows.touch(pattern, row);
+        let width = D * (pattern.offsets[row + 1] - pattern.offsets[row]);
+        let start = rows.start(pattern, row);
+        for i in 0..D {
+            let target = rows.values(start + i * width, width);
+            let source = &block[(a * D + i) * count * D..(a * D + i + 1) * count * D];
+            for b in 0..count {
+                let first = usize::from(place.positions[a * runs + b / place.run]);
+                let column = (first + b % place.run) * D;
+                for k in 0..D {
+                    target[column + k] += source[b * D + k];
+                }
+            }
+        }
+    }
+}
