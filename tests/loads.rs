@@ -63,7 +63,8 @@ fn constants_ramp_and_functions_of_s_do_not() {
         block(&format!("point = {{ nearest = {place}, force = [500.0, {force}] }}"))
     };
     let gravity = |value: &str| block(&format!("gravity = [2.0, {value}]"));
-    let loads: [(&dyn Fn(&str) -> Run, &str); 2] = [(&point, "-4e4"), (&gravity, "-9.0")];
+    type Load<'a> = &'a dyn Fn(&str) -> Run;
+    let loads: [(Load<'_>, &str); 2] = [(&point, "-4e4"), (&gravity, "-9.0")];
     for (load, value) in loads {
         let constant = load(value);
         let end = displacements(constant.clone(), 4);
