@@ -509,7 +509,7 @@ fn options_that_the_solver_does_not_know() {
   tip: a similar argument exists: '--force'
 
 Usage: mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out DIR] [--check] \
-[--restart FILE|last] [--force] [PETSc options]
+[--restart FILE|last] [--force] [--quiet|--verbose] [PETSc options]
 
 For more information, try '--help'.",
     );
