@@ -180,8 +180,9 @@ fn a_chain_knows_what_it_has_begun() {
     let stand_in = folder.path().join("program.sh");
     let count = folder.path().join("count");
     let body = format!(
-        "#!/bin/sh\necho \"$@\" >>{count}\ncase $(wc -l <{count}) in\n1) exit 137 ;;\n2) rm {out}/*; \
-         echo half >{out}/history.csv; exit 137 ;;\nesac\nexec {PROGRAM} \"$@\"\n",
+        "#!/bin/sh\necho \"$@\" >>{count}\ncase $(wc -l <{count}) in\n1) exit 137 ;;\n2) head -n 1 \
+         {out}/history.csv >{count}.head; rm {out}/*; mv {count}.head {out}/history.csv; \
+         exit 137 ;;\nesac\nexec {PROGRAM} \"$@\"\n",
         count = count.display(),
         out = out.display(),
     );

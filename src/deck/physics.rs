@@ -100,6 +100,78 @@ pub fn difference(first: &str, second: &str) -> Option<(String, String)> {
     }
 }
 
+/// Keys that format 1 of the checkpoints did not know, and what its programs did.
+const FORMER: [(&str, &str, &str); 1] = [("[method]", "gimp_edge", "\"published\"")];
+
+/// [`difference`] from the text in a checkpoint of format 1, whose programs told other keys: sections
+/// must be those of `ours`, and keys that both texts have must agree. A key of `ours` alone must have
+/// the value that stands for what those programs did.
+pub fn difference_from_format_1(theirs: &str, ours: &str) -> Option<(String, String)> {
+    let (former, now) = (entries(theirs), entries(ours));
+    let line = |key: &str, value: &str| format!("{key} = {value}");
+    if let Some((time_step, extended)) = time_step_of(&former, &now)
+        && time_step != extended
+    {
+        return Some((line("time step", &time_step), line("time step", &extended)));
+    }
+    let sections = |entries: &[Entry]| -> Vec<String> {
+        let mut names: Vec<String> = entries.iter().map(|entry| entry.section.clone()).collect();
+        names.dedup();
+        names.retain(|name| !name.is_empty());
+        names
+    };
+    if let Some(found) = difference(&sections(&former).join("\n"), &sections(&now).join("\n")) {
+        return Some(found);
+    }
+    for entry in &now {
+        let same = |other: &&Entry| (&other.section, &other.key) == (&entry.section, &entry.key);
+        let value = former.iter().find(same).map(|other| other.value.as_str());
+        let meant = FORMER.iter().find(|(section, key, _)| {
+            (*section, *key) == (entry.section.as_str(), entry.key.as_str())
+        });
+        if let Some(value) = value.or(meant.map(|(_, _, value)| *value))
+            && value != entry.value
+        {
+            return Some((line(&entry.key, value), line(&entry.key, &entry.value)));
+        }
+    }
+    None
+}
+
+/// A line `key = value` below the header `section`; headers of arrays carry their number.
+struct Entry {
+    section: String,
+    key: String,
+    value: String,
+}
+
+fn entries(text: &str) -> Vec<Entry> {
+    let (mut section, mut headers, mut entries) = (String::new(), Vec::new(), Vec::new());
+    for line in text.lines().map(str::trim) {
+        if line.starts_with('[') && line.ends_with(']') && !line.contains('=') {
+            headers.push(line);
+            let before = headers.iter().filter(|header| **header == line).count();
+            section =
+                if line.starts_with("[[") { format!("{line} {before}") } else { line.to_string() };
+        } else if let Some((key, value)) = line.split_once(" = ") {
+            let [section, key, value] = [&section, key, value].map(String::from);
+            entries.push(Entry { section, key, value });
+        }
+    }
+    entries
+}
+
+/// Time steps of the two texts where `now` tells one: that of format 1 follows from its steps.
+fn time_step_of(former: &[Entry], now: &[Entry]) -> Option<(String, String)> {
+    let told = now.iter().find(|entry| entry.key == "time step")?;
+    let number = |key: &str| -> Option<f64> {
+        let of_analysis = |entry: &&Entry| entry.section == "[analysis]" && entry.key == key;
+        former.iter().find(of_analysis)?.value.parse().ok()
+    };
+    let time_step = number("duration")? / number("steps")?;
+    Some((format!("{time_step:.12e} s"), told.value.clone()))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -123,6 +195,22 @@ mod tests {
             "petsc.log_view=true",
         ];
         assert_eq!(difference(&of(&[]), &of(&same)), None);
+    }
+
+    #[test]
+    fn format_1_is_compared_by_the_keys_of_both() {
+        let ours = of(&["ghost=off", "method.gimp_edge=\"published\""]);
+        // Earlier programs told keys without effect, and had no other edge than the published one.
+        let theirs = ours.replace("gimp_edge = \"published\"", "stress_update = \"usl\"");
+        assert_ne!(theirs, ours);
+        assert_eq!(difference_from_format_1(&theirs, &ours), None);
+        let found = difference_from_format_1(&theirs, &of(&["ghost=off"]));
+        let edge = |value: &str| format!("gimp_edge = \"{value}\"");
+        assert_eq!(found, Some((edge("published"), edge("continued"))));
+        let steps = difference_from_format_1(&theirs.replace("steps = 50", "steps = 51"), &ours);
+        assert_eq!(steps, Some(("steps = 51".into(), "steps = 50".into())));
+        // Ghost was off where nothing was said.
+        assert!(difference_from_format_1(&theirs, &of(&[])).is_some());
     }
 
     #[test]

@@ -54,7 +54,6 @@ const SPACE: &str = "mms-3d-mesh";
 fn irregular_triangles_converge_at_second_order() {
     let meshes = || [4, 8, 16].map(|n| irregular::triangles(n, 1));
     assert_second_order(&errors(PLANE, meshes(), "mpm", 8), 1.7);
-    assert_second_order(&errors(PLANE, meshes(), "cpdi1", 4), 1.7);
 }
 
 #[test]
@@ -65,9 +64,7 @@ fn irregular_quadrilaterals_converge_at_second_order() {
 }
 
 #[test]
-fn irregular_tetrahedra_and_hexahedra_converge_at_second_order() {
-    let tetrahedra = [2, 4, 8].map(|n| irregular::tetrahedra(n, 1));
-    assert_second_order(&errors(SPACE, tetrahedra, "cpdi1", 2), 1.6);
+fn irregular_hexahedra_converge_at_second_order() {
     let hexahedra = [1, 2, 4].map(|n| irregular::tetrahedra(n, 1).into_bricks());
     assert_second_order(&errors(SPACE, hexahedra, "cpdi2", 2), 1.1);
 }
@@ -78,7 +75,6 @@ fn finer_irregular_meshes_of_the_plane_converge_at_second_order() {
     for seed in [1, 2] {
         let triangles = || [4, 8, 16, 32].map(|n| irregular::triangles(n, seed));
         assert_second_order(&errors(PLANE, triangles(), "mpm", 8), 1.65);
-        assert_second_order(&errors(PLANE, triangles(), "cpdi1", 4), 1.65);
         let quads = || [4, 8, 16, 32].map(|n| irregular::triangles(n, seed).into_bricks());
         assert_second_order(&errors(PLANE, quads(), "mpm", 16), 1.85);
         assert_second_order(&errors(PLANE, quads(), "cpdi1", 4), 1.9);
@@ -91,7 +87,6 @@ fn finer_irregular_meshes_of_the_plane_converge_at_second_order() {
 fn finer_irregular_meshes_of_space_converge_at_second_order() {
     let tetrahedra = || [4, 8, 16].map(|n| irregular::tetrahedra(n, 1));
     assert_second_order(&errors(SPACE, tetrahedra(), "mpm", 3), 1.6);
-    assert_second_order(&errors(SPACE, tetrahedra(), "cpdi1", 2), 1.6);
     let hexahedra = || [1, 2, 4].map(|n| irregular::tetrahedra(n, 1).into_bricks());
     assert_second_order(&errors(SPACE, hexahedra(), "mpm", 4), 1.1);
     assert_second_order(&errors(SPACE, hexahedra(), "cpdi1", 2), 1.1);

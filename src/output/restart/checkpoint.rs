@@ -23,6 +23,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::run_state::RunState;
 use super::seal::{self, Checksum, Flaw, checksum_of, wrapping_sum};
+use crate::deck::physics::{difference, difference_from_format_1};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::agreement::{all_agree, on_root};
@@ -130,11 +131,11 @@ pub fn read<const D: usize>(
     physics: &str,
     comm: &SimpleCommunicator,
 ) -> std::result::Result<Restored<D>, Refusal> {
-    match seal::test(path, FORMAT, comm) {
-        Ok(Ok(_)) => {}
+    let format = match seal::test(path, FORMAT, comm) {
+        Ok(Ok(format)) => format,
         Ok(Err(flaw)) => return Err(flaw.into()),
         Err(why) => return Err(Refusal::Unreadable(why.to_string())),
-    }
+    };
     // Sealed, and yet not what was in memory when it was written.
     let damaged = |why: Error| Refusal::Damaged(why.to_string());
     let file = FileReader::open(path, comm).map_err(damaged)?;
@@ -143,7 +144,13 @@ pub fn read<const D: usize>(
     let input = Reader { file, comm, sums };
     let own = input.text("text.physics").map_err(damaged)?;
     if own != physics {
-        return Err(Refusal::Foreign(foreign(&own, physics)));
+        let found = match format {
+            1 => difference_from_format_1(&own, physics),
+            _ => Some(difference(&own, physics).unwrap_or_default()),
+        };
+        if let Some(found) = found {
+            return Err(Refusal::Foreign(foreign(found)));
+        }
     }
     content(&input, path).map_err(damaged)
 }
@@ -189,15 +196,14 @@ const EXTENDING: &str = "\n    why: loads, displacements and rotations that are 
     analysis would mean something else\n    try: the steps of the checkpoint; a dynamic run can be \
     extended where its motions and loads are formulas of t, without s";
 
-fn foreign(theirs: &str, ours: &str) -> String {
-    match crate::deck::physics::difference(theirs, ours) {
-        Some((theirs, ours)) => {
-            let longer = theirs.starts_with("steps = ") || theirs.starts_with("duration = ");
-            let why = if longer { EXTENDING } else { "" };
-            format!("it was written with `{theirs}` where this deck has `{ours}`{why}")
-        }
-        None => "its deck differs".into(),
+/// In words; lines that are empty are of texts that differ in nothing but line ends.
+fn foreign((theirs, ours): (String, String)) -> String {
+    if theirs == ours {
+        return "its deck differs".into();
     }
+    let longer = theirs.starts_with("steps = ") || theirs.starts_with("duration = ");
+    let why = if longer { EXTENDING } else { "" };
+    format!("it was written with `{theirs}` where this deck has `{ours}`{why}")
 }
 
 fn content<const D: usize>(input: &Reader<'_>, path: &Path) -> Result<Restored<D>> {
@@ -426,7 +432,7 @@ mod tests {
         let path = Path::new("out/checkpoint-000001.h5");
         let text = Refusal::Newer(7).describe(path);
         assert!(text.contains("format 7") && text.contains("checkpoint-000001.h5"), "{text}");
-        let text = Refusal::Foreign(foreign("a = 1\nb = 2", "a = 1\nb = 3")).describe(path);
+        let text = Refusal::Foreign(foreign(("b = 2".into(), "b = 3".into()))).describe(path);
         assert!(text.contains("`b = 2`") && text.contains("`b = 3`"), "{text}");
     }
 }
