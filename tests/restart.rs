@@ -613,3 +613,42 @@ gravity = [0, -10]
 every = 1
 checkpoint = { every = 8, keep = 2 }
 "#;
+
+/// A model that hardens: its state is written, read, moved between ranks, and given back by a step
+/// that is cut.
+#[test]
+fn state_of_a_hardening_material_goes_with_its_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let deck = deck("restart");
+    let at = |name: String| folder.path().join(name);
+    let hardens = ["--set", "material.clay.hardening=2e5"];
+    for wrote in 1..=3 {
+        run_well(wrote, &deck, &at(format!("whole-{wrote}")), &hardens);
+    }
+    let reference = points_of(&at("whole-1".into()).join("checkpoint-000006.h5"));
+    let largest = reference["state"].iter().fold(0.0, |most: f64, &word| most.max(word));
+    assert!(largest > 0.01, "nothing hardens: {largest}");
+    let norms = reference["plastic_strain"].iter().map(|norm| norm * (2.0_f64 / 3.0).sqrt());
+    for (word, norm) in reference["state"].iter().zip(norms) {
+        assert!((word - norm).abs() < 1e-12, "{word} {norm}");
+    }
+    for wrote in 1..=3 {
+        let middle = at(format!("whole-{wrote}")).join("checkpoint-000003.h5");
+        for goes_on in 1..=3 {
+            let part = at(format!("part-{wrote}-{goes_on}"));
+            let words = [&hardens[..], &["--restart", &middle.display().to_string()]].concat();
+            run_well(goes_on, &deck, &part, &words);
+            let end = points_of(&part.join("checkpoint-000006.h5"));
+            let (error, field) = difference(&reference, &end);
+            assert!(error < 1e-8, "{wrote} -> {goes_on}: {field} differs by {error:e}");
+            if wrote == goes_on {
+                let whole = points_of(&at(format!("whole-{wrote}")).join("checkpoint-000006.h5"));
+                assert_eq!(difference(&whole, &end).0, 0.0, "{wrote} ranks: not bit by bit");
+            }
+        }
+    }
+    // Without hardening the digits are those of the perfect law, and nothing is carried.
+    run_well(1, &deck, &at("perfect".into()), &[]);
+    let perfect = points_of(&at("perfect".into()).join("checkpoint-000006.h5"));
+    assert!(!perfect.contains_key("state"));
+}

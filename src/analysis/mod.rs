@@ -7,6 +7,7 @@
 //! | `explicit` | `explicit.rs`, `explicit_step.rs`, `explicit_nodes.rs` | Ghost §2.3, 3.5 |
 //! | `implicit-dynamic` | `implicit.rs`, `inertial.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
+//! | `element-test` | `element_test.rs` | one point, no grid |
 //! | load steps, cut and grown again | `load_steps.rs` | |
 //! | time steps and their stability limit | `time_steps.rs` | Ghost §3.5 |
 //! | Newton's method for a step | `newton.rs`, `convergence.rs` | Lagrangian eq. 26-30, 40 |
@@ -16,6 +17,7 @@
 
 pub mod conditioning;
 pub mod convergence;
+pub mod element_test;
 pub mod equilibrium;
 pub mod explicit;
 pub mod explicit_nodes;

@@ -32,6 +32,8 @@ pub struct Deck {
     pub parallel: Parallel,
     /// `[conditioning] displacement`, m: total rigid motion over the analysis.
     pub conditioning_displacement: Option<Vec<f64>>,
+    /// `[element_test]`; then the deck has no grid and no bodies.
+    pub element_test: Option<ElementTest>,
     /// `[petsc]`: option name without its dash, and value ("" for a bare flag).
     pub petsc: Vec<(String, String)>,
     /// What the user should know of the deck itself, a line each.
@@ -61,6 +63,7 @@ pub enum AnalysisType {
     Explicit,
     ImplicitDynamic,
     Conditioning,
+    ElementTest,
 }
 
 impl AnalysisType {
@@ -68,6 +71,48 @@ impl AnalysisType {
     pub fn has_time(self) -> bool {
         matches!(self, AnalysisType::Explicit | AnalysisType::ImplicitDynamic)
     }
+}
+
+/// What is done to the one point of an element test.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ElementTest {
+    /// Index into `Deck::materials`.
+    pub material: usize,
+    pub path: ElementPath,
+    /// Pa, compression positive: isotropic stress at the start.
+    pub confining: f64,
+    /// Axial logarithmic strain at the end, compression positive, or the amount of shear.
+    pub strain: f64,
+    /// Of each leg of a history; of the whole test otherwise.
+    pub steps: usize,
+    /// Ends of the legs of `ElementPath::Strain`: principal logarithmic strains, tension positive.
+    pub history: Vec<[f64; 3]>,
+}
+
+impl ElementTest {
+    /// Steps of the whole test.
+    pub fn total_steps(&self) -> usize {
+        self.steps * self.history.len().max(1)
+    }
+
+    /// Strains after a step of the history.
+    pub fn history_at(&self, step: usize) -> [f64; 3] {
+        let leg = (step.max(1) - 1) / self.steps;
+        let from = if leg == 0 { [0.0; 3] } else { self.history[leg - 1] };
+        let share = (step - leg * self.steps) as f64 / self.steps as f64;
+        [0, 1, 2].map(|a| from[a] + share * (self.history[leg][a] - from[a]))
+    }
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ElementPath {
+    TriaxialDrained,
+    TriaxialUndrained,
+    Oedometer,
+    Isotropic,
+    SimpleShear,
+    Biaxial,
+    Strain,
 }
 
 #[derive(Debug, Clone, PartialEq)]

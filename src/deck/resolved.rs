@@ -2,7 +2,8 @@
 
 use super::expression::Expression;
 use super::model::{
-    BodySource, Deck, Every, Grid, Load, Material, MeshMotion, MeshSource, Place, Seeding,
+    BodySource, Deck, ElementTest, Every, Grid, Load, Material, MeshMotion, MeshSource, Place,
+    Seeding,
 };
 use super::schema::{self, AXES, SIDES};
 use super::shape::{Form, Shape};
@@ -17,8 +18,14 @@ pub fn resolved(deck: &Deck) -> String {
         w.line("", "ghost", quote("off"));
     }
     analysis(&mut w, deck);
-    grid(&mut w, deck);
+    if deck.element_test.is_none() {
+        grid(&mut w, deck);
+    }
     materials_and_bodies(&mut w, deck);
+    if let Some(test) = &deck.element_test {
+        element_test(&mut w, deck, test);
+        return w.text;
+    }
     conditions(&mut w, deck);
     results(&mut w, deck);
     w.text
@@ -120,6 +127,9 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     w.line("analysis", "newmark_gamma", number(a.newmark_gamma));
     w.line("analysis", "hht_alpha", number(a.hht_alpha));
 
+    if deck.element_test.is_some() {
+        return;
+    }
     let m = &deck.method;
     w.table("[method]");
     w.line("method", "basis", quote(m.basis.name()));
@@ -154,6 +164,20 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
         w.table("[conditioning]");
         w.line("conditioning", "displacement", vector(motion));
     }
+}
+
+fn element_test(w: &mut Writer<'_>, deck: &Deck, test: &ElementTest) {
+    w.table("[element_test]");
+    w.line("element_test", "material", quote(&deck.materials[test.material].name));
+    w.line("element_test", "path", quote(test.path.name()));
+    w.line("element_test", "confining", number(test.confining));
+    if test.history.is_empty() {
+        w.line("element_test", "strain", number(test.strain));
+    } else {
+        let legs = test.history.iter().map(|strain| vector(strain));
+        w.line("element_test", "history", array(legs));
+    }
+    w.line("element_test", "steps", test.steps.to_string());
 }
 
 fn grid(w: &mut Writer<'_>, deck: &Deck) {

@@ -1,8 +1,8 @@
 //! The deck's own words for the enumerations of the model.
 
 use super::model::{
-    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
-    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
+    Initial, InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
     VerifyNorm,
 };
 
@@ -36,6 +36,16 @@ words! {
         "explicit" => Explicit,
         "implicit-dynamic" => ImplicitDynamic,
         "conditioning" => Conditioning,
+        "element-test" => ElementTest,
+    }
+    ElementPath {
+        "triaxial-drained" => TriaxialDrained,
+        "triaxial-undrained" => TriaxialUndrained,
+        "oedometer" => Oedometer,
+        "isotropic" => Isotropic,
+        "simple-shear" => SimpleShear,
+        "biaxial" => Biaxial,
+        "strain" => Strain,
     }
     OnFailure { "stop" => Stop, "cut" => Cut }
     InvertedIterates { "reject" => Reject, "allow" => Allow }

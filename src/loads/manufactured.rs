@@ -38,7 +38,7 @@ impl Manufactured {
     ) -> ([f64; D], Matrix3<f64>) {
         let jets: [Jet; D] = self.jets(scope);
         let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
-        let state = &material.model().initial_state()[..];
+        let state = &material.model().initial_state([0.0; 3])[..];
         let start = StepStart {
             material,
             state,
@@ -64,7 +64,7 @@ impl Manufactured {
         let jets: [Jet; D] = self.jets(scope);
         let gradient = displacement_gradient(&jets);
         let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
-        let state = &material.model().initial_state()[..];
+        let state = &material.model().initial_state([0.0; 3])[..];
         let start = StepStart {
             material,
             state,

@@ -9,9 +9,11 @@
 //! |---|---|---|---|
 //! | `hencky` | [`Hencky`] | `hencky.rs` | Lagrangian §2 |
 //! | `von-mises` | [`VonMises`] | `von_mises.rs` | Lagrangian eq. 43 |
+//! | `neo-hookean` | [`NeoHookean`] | `neo_hookean.rs` | Bonet, Wood 2008, eq. 6.27 |
 //! | `tresca` | [`Tresca`] | `tresca.rs` | Mohr-Coulomb without friction |
 //! | `mohr-coulomb` | [`MohrCoulomb`] | `mohr_coulomb.rs` | Clausen et al. 2007 |
 //! | `drucker-prager` | [`DruckerPrager`] | `drucker_prager.rs` | de Souza Neto et al. 2008, 8.3 |
+//! | `cam-clay` | [`CamClay`] | `cam_clay.rs` | Borja, Tamagnini 1998 |
 //!
 //! | file | idea |
 //! |---|---|
@@ -23,25 +25,33 @@
 //! Where parameters vary in space, each point carries its own, and the model is made from them
 //! whenever the point responds; where they are numbers, it is made once for the body.
 
+pub mod cam_clay;
 pub mod drucker_prager;
 pub mod hencky;
 mod local;
 mod model;
 pub mod mohr_coulomb;
+pub mod neo_hookean;
 pub mod parameter;
 #[cfg(test)]
 mod published;
+#[cfg(test)]
+mod published_clay;
+#[cfg(test)]
+mod published_metals;
 pub mod tresca;
 pub mod von_mises;
 
 #[cfg(test)]
 mod tests;
 
+pub use cam_clay::CamClay;
 pub use drucker_prager::DruckerPrager;
 pub use hencky::Hencky;
 pub use local::{LocalMaterial, local};
 pub use model::{MOST_STATE, Misfit, Model, Response, StateVariable};
 pub use mohr_coulomb::MohrCoulomb;
+pub use neo_hookean::NeoHookean;
 pub use parameter::Parameter;
 pub use tresca::Tresca;
 pub use von_mises::VonMises;
@@ -121,14 +131,14 @@ macro_rules! models {
             }
 
             /// See [`Model::initial_state`].
-            pub fn initial_state(&self) -> [f64; MOST_STATE] {
-                match self { $( Material::$model(model) => model.initial_state(), )* }
+            pub fn initial_state(&self, elastic_strain: [f64; 3]) -> [f64; MOST_STATE] {
+                match self { $( Material::$model(model) => model.initial_state(elastic_strain), )* }
             }
         }
     };
 }
 
-models! { Hencky, VonMises, Tresca, MohrCoulomb, DruckerPrager }
+models! { Hencky, NeoHookean, VonMises, Tresca, MohrCoulomb, DruckerPrager, CamClay }
 
 /// What is known of a model before it has parameters.
 #[derive(Clone, Copy)]

@@ -78,8 +78,10 @@ pub trait Model: Copy + Sized {
         Self::STATE.len()
     }
 
-    /// The state of a point before anything has happened.
-    fn initial_state(&self) -> [f64; MOST_STATE] {
+    /// The state of a point before anything has happened, under the stress that its principal
+    /// elastic strains give. Not finite where that stress allows none.
+    fn initial_state(&self, elastic_strain: [f64; 3]) -> [f64; MOST_STATE] {
+        let _ = elastic_strain;
         let mut state = [0.0; MOST_STATE];
         for (word, variable) in state.iter_mut().zip(Self::STATE) {
             *word = variable.initial;

@@ -20,7 +20,7 @@ fn drucker_prager(friction: f64, dilation: f64, fit: f64) -> Material {
 }
 
 /// A figure with about eight digits.
-fn near(found: f64, wanted: f64, scale: f64) {
+pub(super) fn near(found: f64, wanted: f64, scale: f64) {
     assert!((found - wanted).abs() < scale, "{found} in place of {wanted}");
 }
 
@@ -37,7 +37,11 @@ fn check(material: &Material, trial: [f64; 3], stress: [f64; 3], tangent: [[f64;
 
 /// The tangent, the shear moduli and the split of the strain of one state.
 fn by_differences(material: &Material, trial: [f64; 3], state: &[f64]) {
-    const STEP: f64 = 1e-9;
+    by_differences_with(material, trial, state, 1e-9);
+}
+
+/// The same with differences over `step` to each side.
+pub(super) fn by_differences_with(material: &Material, trial: [f64; 3], state: &[f64], step: f64) {
     let young = material.stiffness();
     let found = material.respond(trial, state);
     for b in 0..3 {
@@ -46,9 +50,9 @@ fn by_differences(material: &Material, trial: [f64; 3], state: &[f64]) {
             strain[b] += by;
             material.respond(strain, state).stress
         };
-        let (up, down) = (shifted(STEP), shifted(-STEP));
+        let (up, down) = (shifted(step), shifted(-step));
         for a in 0..3 {
-            let difference = (up[a] - down[a]) / (2.0 * STEP);
+            let difference = (up[a] - down[a]) / (2.0 * step);
             near(found.tangent[a][b], difference, 1e-6 * young);
         }
     }
@@ -173,10 +177,10 @@ fn drucker_prager_owes_on_cone_and_apex() {
 }
 
 /// Numbers in (-1, 1), the same on every run.
-struct Sequence(u64);
+pub(super) struct Sequence(pub u64);
 
 impl Sequence {
-    fn next(&mut self) -> f64 {
+    pub fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
     }

@@ -9,6 +9,8 @@ use crate::error::Result;
 /// Fixed names of a results directory.
 pub const SUMMARY: &str = "summary.json";
 pub const HISTORY: &str = "history.csv";
+/// Rows of an element test.
+pub const ELEMENT: &str = "element.csv";
 pub const RESIDUALS: &str = "residuals.csv";
 pub const LOG: &str = "log.txt";
 pub const DECK: &str = "input.toml";
@@ -25,10 +27,11 @@ pub const SERIES_HEAD: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
      <Grid Name=\"series\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [&str; 9] = [
+const NAMES: [&str; 10] = [
     SUMMARY,
     HISTORY,
     RESIDUALS,
+    ELEMENT,
     LOG,
     DECK,
     RESOLVED_DECK,

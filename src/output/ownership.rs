@@ -9,7 +9,9 @@ use std::fs::{self, File};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
-use super::names::{DECK, HISTORY, LOG, RESIDUALS, RESOLVED_DECK, SERIES_HEAD, SUMMARY, names_in};
+use super::names::{
+    DECK, ELEMENT, HISTORY, LOG, RESIDUALS, RESOLVED_DECK, SERIES_HEAD, SUMMARY, names_in,
+};
 use super::restart::seal;
 use crate::error::Result;
 
@@ -33,10 +35,11 @@ enum Proof {
 }
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [(&str, Proof); 9] = [
+const NAMES: [(&str, Proof); 10] = [
     (SUMMARY, Proof::Summary),
     (HISTORY, Proof::Begins(TABLE_HEAD)),
     (RESIDUALS, Proof::Begins(TABLE_HEAD)),
+    (ELEMENT, Proof::Begins(TABLE_HEAD)),
     (LOG, Proof::Begins(LOG_HEAD)),
     (DECK, Proof::Company),
     (RESOLVED_DECK, Proof::Company),

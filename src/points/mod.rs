@@ -386,6 +386,25 @@ mod tests {
         }
     }
 
+    /// A step that fails after the points have responded gives their state back.
+    #[test]
+    fn state_comes_back() {
+        let mut points = Points::<2>::of_basis(Basis::Mpm);
+        for k in 0..3 {
+            points.push_unstrained(k, 0, [k as f64, 0.5], 1.0, 2.0, [0.5; 2]);
+        }
+        points.state = Named::zeros(vec![vec!["hardening".to_string()]], 3);
+        points.state.values = vec![0.1, 0.2, 0.3];
+        let mut before = Snapshot::default();
+        for _ in 0..2 {
+            before.begin();
+            before.state.set_aside(&mut points.state.values);
+            points.state.set(1, &[0.9]);
+            before.restore(&mut points);
+            assert_eq!(points.state.values, [0.1, 0.2, 0.3]);
+        }
+    }
+
     #[test]
     fn what_a_step_overwrote_comes_back() {
         let mut points = Points::<2>::of_basis(Basis::Gimp);

@@ -23,12 +23,26 @@ pub fn equip<const D: usize>(
     points: &mut Points<D>,
 ) -> Result<()> {
     set_parameters(world, deck, points)?;
-    points.state = Named::zeros(state_names(materials), points.len());
+    points.state = Named::zeros(state_names(deck, materials), points.len());
+    let mut fault: Option<(u64, String)> = None;
     for p in 0..points.len() {
-        let state = local(materials, points, p).model().initial_state();
+        let state = local(materials, points, p).model().initial_state(points.elastic_strain(p));
+        if state.iter().any(|word| !word.is_finite())
+            && fault.as_ref().is_none_or(|(id, _)| points.id[p] < *id)
+        {
+            let body = &deck.bodies[points.body[p] as usize];
+            let material = &deck.materials[body.material];
+            let why = format!(
+                "at point {} of body \"{}\" the initial stress is no compression that ocr could be \
+                 a ratio to: give preconsolidation in its place",
+                points.id[p], body.name
+            );
+            let key = format!("material.{}.ocr", material.name);
+            fault = Some((points.id[p], deck.places.say(&key, &why)));
+        }
         points.state.set(p, &state);
     }
-    Ok(())
+    world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))
 }
 
 /// Gives the points their own parameters and keeps the state that a checkpoint held, in the order
@@ -60,10 +74,15 @@ pub fn equip_restored<const D: usize>(
     world.first_message(message).map_or(Ok(()), |message| Err(Error::File(message)))
 }
 
-/// Names of the state variables of each body.
-fn state_names(materials: &[Material]) -> Vec<Vec<String>> {
-    let names = |material: &Material| material.state().iter().map(|v| v.name.to_string()).collect();
-    materials.iter().map(names).collect()
+/// Names of the state variables of each body. A body whose parameters vary carries all of its
+/// model's: what is zero at one point need not be at the next.
+fn state_names(deck: &Deck, materials: &[Material]) -> Vec<Vec<String>> {
+    let of_body = |(body, material): (&model::Body, &Material)| {
+        let given = &deck.materials[body.material];
+        let carried = if given.varies() { given.model.state } else { material.state() };
+        carried.iter().map(|variable| variable.name.to_string()).collect()
+    };
+    deck.bodies.iter().zip(materials).map(of_body).collect()
 }
 
 fn set_parameters<const D: usize>(

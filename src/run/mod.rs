@@ -3,12 +3,14 @@
 //! | step | file |
 //! |---|---|
 //! | the stages of a run, in order | `session.rs` |
+//! | a run of one point, without a grid | `element_run.rs` |
 //! | deck to points on their ranks | `setup.rs` |
 //! | parameters and state of the points' materials | `materials.rs` |
 //! | what is checked before anything is written | `start_checks/` |
 //! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs` |
 //! | the process that MPI starts | `process.rs` |
 
+mod element_run;
 mod materials;
 pub mod plan;
 mod plan_checks;

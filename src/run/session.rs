@@ -26,7 +26,7 @@ use crate::petsc::{files, known};
 
 use super::start_checks::formulas;
 use super::start_checks::support;
-use super::{plan, process, setup};
+use super::{element_run, plan, process, setup};
 use crate::analysis::explicit::Explicit;
 use crate::analysis::implicit::{self, Implicit};
 use crate::analysis::{conditioning, solver, time_loop};
@@ -120,6 +120,10 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     let mpi = versions.get("MPI").map_or("", String::as_str);
     if let Some(text) = launcher::warning(world.size(), mpi, |name| std::env::var(name).ok()) {
         log.say(&text);
+    }
+    if let Some(test) = deck.element_test.clone() {
+        let outcome = element_run::run(world, &deck, &test, &text, arguments, versions, log);
+        return session.end(outcome);
     }
     let start = Start { world, session: &session, arguments, text, versions, log };
     let outcome = match deck.dimension {
@@ -275,6 +279,8 @@ impl Start<'_> {
                 time_loop::run(&mut run, &mut analysis)
             }
             AnalysisType::Conditioning => conditioning::run(&mut run),
+            // Runs without a grid: see [`element_run`].
+            AnalysisType::ElementTest => Ok(Ending::completed()),
         };
         let mut of_numerics = true;
         let (ending, kind): (_, fn(String) -> Error) = match outcome {

@@ -8,6 +8,7 @@ mod beam;
 mod collapse;
 mod column;
 mod default_ghost;
+mod element;
 mod equality;
 mod round_off;
 mod shear;

@@ -132,6 +132,10 @@ const LOADED: Reader = only("analysis.type", &["quasi-static", "explicit", "impl
 /// Analyses with a stiffness matrix, and with a mass matrix: what Ghost stabilises.
 const STIFF: Reader = only("analysis.type", &["quasi-static", "implicit-dynamic", "conditioning"]);
 const HEAVY: Reader = only("analysis.type", &["explicit", "implicit-dynamic", "conditioning"]);
+/// Analyses of bodies on a grid.
+const ON_GRID: Reader =
+    only("analysis.type", &["quasi-static", "explicit", "implicit-dynamic", "conditioning"]);
+const ELEMENT_TEST: Reader = only("analysis.type", &["element-test"]);
 const GIMP: Reader = only("method.basis", &["gimp"]);
 
 const fn key(name: &'static str, kind: Kind, need: Need, doc: &'static str) -> Key {

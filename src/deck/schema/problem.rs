@@ -1,18 +1,18 @@
 //! Keys of the analysis, the method and the grid, and of what is written.
 
 use super::Kind::{
-    Choice, Choices, Count, Counts, Named, Number, NumberOrVector, Special, Table, Tables, Text,
-    Vector,
+    Choice, Choices, Count, Counts, Named, Number, NumberOrVector, Points, Special, Table, Tables,
+    Text, Vector,
 };
 use super::Need::{Default, Optional, Required};
 use super::{
-    DYNAMIC, EXPLICIT, GIMP, HEAVY, IMPLICIT, IMPLICIT_DYNAMIC, LOADED, POSITIVE, QUASI_STATIC,
-    STIFF, Section, at_least, between, key, only,
+    DYNAMIC, ELEMENT_TEST, EXPLICIT, GIMP, HEAVY, IMPLICIT, IMPLICIT_DYNAMIC, LOADED, ON_GRID,
+    POSITIVE, QUASI_STATIC, STIFF, Section, at_least, between, key, only,
 };
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
-    AnalysisType, Basis, Cost, DomainUpdate, Element, Frame, GhostScaling, GimpEdge, Initial,
-    InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
+    Initial, InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
     VerifyNorm,
 };
 
@@ -24,22 +24,34 @@ pub const SECTIONS: &[Section] = &[
         keys: &[
             key("title", Text, Default("\"\""), "Shown in the banner and stored with the results."),
             key("analysis", Table("analysis"), Required, "What is solved, and how finely."),
-            key("method", Table("method"), Optional("all defaults"), "Variant of the method."),
+            key("method", Table("method"), Optional("all defaults"), "Variant of the method.")
+                .read_by(&[ON_GRID]),
             key("ghost", Table("ghost"), Optional("on, with the default factors of [ghost]"),
-                "Ghost stabilisation; `ghost = \"off\"`, before the first table, turns it off."),
-            key("grid", Table("grid"), Required, "Background grid."),
+                "Ghost stabilisation; `ghost = \"off\"`, before the first table, turns it off.")
+                .read_by(&[ON_GRID]),
+            key("grid", Table("grid"), Required, "Background grid.")
+                .read_by(&[ON_GRID]),
             key("material", Named("material"), Required, "At least one `[material.NAME]`."),
-            key("body", Tables("body"), Required, "At least one `[[body]]`."),
-            key("boundary", Tables("boundary"), Optional("none"), "Prescribed displacements."),
+            key("body", Tables("body"), Required, "At least one `[[body]]`.")
+                .read_by(&[ON_GRID]),
+            key("boundary", Tables("boundary"), Optional("none"), "Prescribed displacements.")
+                .read_by(&[ON_GRID]),
             key("load", Tables("load"), Optional("none"), "Forces.")
                 .read_by(&[LOADED]),
-            key("verify", Tables("verify"), Optional("none"), "Figures of merit."),
-            key("output", Table("output"), Optional("all defaults"), "What is written, and when."),
-            key("parallel", Table("parallel"), Optional("all defaults"), "Distribution."),
+            key("verify", Tables("verify"), Optional("none"), "Figures of merit.")
+                .read_by(&[ON_GRID]),
+            key("output", Table("output"), Optional("all defaults"), "What is written, and when.")
+                .read_by(&[ON_GRID]),
+            key("parallel", Table("parallel"), Optional("all defaults"), "Distribution.")
+                .read_by(&[ON_GRID]),
             key("petsc", Special("a table of strings, numbers or true"), Optional("none"),
-                "PETSc options of the solvers (`qs_`, `mass_`, `kappa_`) by name without the dash; `true` is a bare flag. No files, no viewers but the terminal; of other options only `log_view = true`: the command line takes all."),
+                "PETSc options of the solvers (`qs_`, `mass_`, `kappa_`) by name without the dash; `true` is a bare flag. No files, no viewers but the terminal; of other options only `log_view = true`: the command line takes all.")
+                .read_by(&[ON_GRID]),
             key("conditioning", Table("conditioning"),
                 Optional("needed by type = \"conditioning\""), "Rigid motion of the study."),
+            key("element_test", Table("element_test"),
+                Optional("needed by type = \"element-test\""), "Path of the test.")
+                .read_by(&[ELEMENT_TEST]),
         ],
     },
     Section {
@@ -48,7 +60,7 @@ pub const SECTIONS: &[Section] = &[
         doc: "What is solved, and in which steps.",
         keys: &[
             key("type", Choice(AnalysisType::NAMES), Required, "Kind of analysis."),
-            key("steps", Count, Optional("needed, except with cfl"),
+            key("steps", Count, Optional("needed, except with cfl and in element tests"),
                 "Equal load steps or time steps.").range(at_least(1.0)),
             key("duration", Number, Optional("needed by dynamics, only there"),
                 "Simulated time; the time step is duration / steps.").unit("s").range(POSITIVE),
@@ -374,5 +386,40 @@ pub const RESULT_SECTIONS: &[Section] = &[
         header: "[conditioning]",
         doc: "With analysis.type = \"conditioning\": rigid motion in `steps` increments, nothing solved.",
         keys: &[key("displacement", Vector, Required, "Total motion.").unit("m")],
+    },
+    Section {
+        name: "element_test",
+        header: "[element_test]",
+        doc: "With analysis.type = \"element-test\": one point of a material under a path of a laboratory test, without grid or body. Axis 1 is the axial one. Rows of element.csv count strain and Cauchy stress tension positive, p compression positive; strain is logarithmic and counts from the start.",
+        keys: &[
+            key("material", Text, Required, "Name of a `[material.NAME]`."),
+            key(
+                "path",
+                Choice(ElementPath::NAMES),
+                Required,
+                "triaxial-drained: axial strain, lateral Cauchy stresses stay. triaxial-undrained: axial strain at constant volume. oedometer: axial strain alone. isotropic: equal strains. biaxial: axial strain, axis 2 keeps its Cauchy stress, axis 3 its length. simple-shear: in the plane of the axes 1 and 2, principal values are told. strain: own history.",
+            ),
+            key(
+                "confining",
+                Number,
+                Default("0.0"),
+                "Isotropic pressure at the start, compression positive.",
+            )
+            .unit("Pa"),
+            key(
+                "strain",
+                Number,
+                Optional("needed, except with history"),
+                "Axial logarithmic strain at the end, compression positive; with simple-shear the amount of shear.",
+            ),
+            key("steps", Count, Required, "Equal steps of the test, or of each leg of a history.")
+                .range(at_least(1.0)),
+            key(
+                "history",
+                Points,
+                Optional("path = \"strain\" needs it, alone"),
+                "Three principal logarithmic strains, tension positive, at the end of each leg.",
+            ),
+        ],
     },
 ];

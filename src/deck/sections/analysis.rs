@@ -64,6 +64,10 @@ fn timing(table: &Table<'_>, kind: AnalysisType) -> Got<()> {
     let dynamic = kind.has_time();
     let name = kind.name();
     let mut result = Ok(());
+    if kind == AnalysisType::ElementTest {
+        let why = "type = \"element-test\" counts its steps in element_test.steps";
+        return table.refuse(&["steps", "duration", "cfl"], why);
+    }
     if dynamic && !table.given("duration") {
         result = Err(table.missing("duration", &format!("type = \"{name}\" needs it")));
     }

@@ -79,7 +79,7 @@ impl Wanted {
             Wanted::Default(scaling) => scaling,
         };
         let weighs = match kind {
-            AnalysisType::QuasiStatic => false,
+            AnalysisType::QuasiStatic | AnalysisType::ElementTest => false,
             AnalysisType::Conditioning => true,
             AnalysisType::Explicit | AnalysisType::ImplicitDynamic => mass == Mass::Consistent,
         };

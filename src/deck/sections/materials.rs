@@ -57,6 +57,10 @@ fn check_stiffness(
     else {
         return Ok(());
     };
+    if !table.given("young") {
+        // The model does without, or has said that it is missing.
+        return Ok(());
+    }
     if young == 0.0 && analysis.cfl.is_some() {
         return Err(table.problem_with_help(
             "young",

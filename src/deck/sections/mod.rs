@@ -3,6 +3,7 @@
 //! | file | sections |
 //! |---|---|
 //! | `analysis.rs` | analysis, method, conditioning |
+//! | `element_test.rs` | element_test, and a deck of nothing else |
 //! | `ghost.rs` | ghost, and what is in force without it |
 //! | `grid.rs` | grid |
 //! | `materials.rs` | material |
@@ -16,6 +17,7 @@
 mod analysis;
 mod bodies;
 mod conditions;
+mod element_test;
 mod ghost;
 mod grid;
 mod materials;
@@ -26,7 +28,7 @@ mod shapes;
 
 use std::path::Path;
 
-use super::model::Deck;
+use super::model::{AnalysisType, Deck};
 use super::places::Places;
 use super::problems::{Got, Problems};
 use super::reader::Table;
@@ -46,6 +48,12 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let output = root.table_or_default("output", |table| results::output(&table, kind));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = petsc::petsc(&root);
+    // Of an analysis that could not be read [element_test] tells the kind.
+    let alone = kind.is_none() && root.given("element_test");
+    if alone || kind == Some(AnalysisType::ElementTest) {
+        let basics = element_test::Basics { title, analysis, method, materials, output, parallel };
+        return element_test::deck(&root, basics, directory);
+    }
     // Without the grid the dimension is unknown, and nothing below can be judged.
     let (grid, dimension) = root.table("grid", |table| grid::grid(&table, directory))?;
     let conditioning = analysis::conditioning(&root, analysis.as_ref().ok(), dimension);
@@ -88,6 +96,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         output: output?,
         parallel: parallel?,
         conditioning_displacement: conditioning?,
+        element_test: None,
         petsc: petsc?,
         notes: Vec::new(),
         places: Places::default(),

@@ -1,0 +1,100 @@
+//! `[element_test]`, and the deck that consists of it and its material.
+
+use std::path::Path;
+
+use crate::deck::model::{
+    Analysis, Deck, ElementPath, ElementTest, Grid, LatticeGrid, Material, Method, Output, Parallel,
+};
+use crate::deck::places::Places;
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+
+/// What every deck has, as far as it could be read.
+pub struct Basics {
+    pub title: Got<String>,
+    pub analysis: Got<Analysis>,
+    pub method: Got<Method>,
+    pub materials: Got<Vec<Material>>,
+    pub output: Got<Output>,
+    pub parallel: Got<Parallel>,
+}
+
+/// The deck of an element test. Its grid is one cell that nothing reads.
+pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
+    let names: Vec<&str> =
+        basics.materials.iter().flatten().map(|material| material.name.as_str()).collect();
+    let test = if root.given("element_test") {
+        root.table("element_test", |table| element_test(&table, &names))
+    } else {
+        Err(root.missing("element_test", "analysis.type = \"element-test\" needs it"))
+    };
+    let (materials, test) = (basics.materials?, test?);
+    if materials[test.material].varies() {
+        let key = "material";
+        let name = &materials[test.material].name;
+        return root.table("element_test", |table| {
+            let why = format!(
+                "\"{name}\" has parameters that depend on the place, and the test has none: \
+                 expected numbers"
+            );
+            Err(table.problem(key, why))
+        });
+    }
+    let cell = LatticeGrid { origin: vec![0.0; 3], spacing: vec![1.0; 3], cells: vec![1; 3] };
+    Ok(Deck {
+        title: basics.title?,
+        dimension: 3,
+        directory: directory.to_path_buf(),
+        analysis: basics.analysis?,
+        method: basics.method?,
+        ghost: None,
+        grid: Grid::Lattice(cell),
+        materials,
+        bodies: Vec::new(),
+        boundaries: Vec::new(),
+        loads: Vec::new(),
+        verify: Vec::new(),
+        output: basics.output?,
+        parallel: basics.parallel?,
+        conditioning_displacement: None,
+        element_test: Some(test),
+        petsc: Vec::new(),
+        notes: Vec::new(),
+        places: Places::default(),
+    })
+}
+
+/// `names` of the materials, those that could be read.
+fn element_test(table: &Table<'_>, names: &[&str]) -> Got<ElementTest> {
+    let material = table.text("material");
+    let path: Got<ElementPath> = table.choice("path");
+    let confining = table.number("confining");
+    let strain = table.number_if("strain");
+    let steps = table.count("steps");
+    let history = if table.given("history") { table.points("history", 3) } else { Ok(Vec::new()) };
+    let (path, strain, history) = (path?, strain?, history?);
+    if path == ElementPath::Strain {
+        table.refuse(&["strain"], "path = \"strain\" takes history in its place")?;
+        if history.is_empty() {
+            return Err(table.missing("history", "path = \"strain\" needs it"));
+        }
+    } else {
+        table.refuse(&["history"], "only path = \"strain\" reads it; give strain")?;
+        if strain.is_none() {
+            return Err(table.missing("strain", ""));
+        }
+    }
+    let material = material?;
+    let Some(place) = names.iter().position(|name| *name == material) else {
+        let known = names.join(", ");
+        return Err(table.problem("material", format!("no [material.{material}]; known: {known}")));
+    };
+    Ok(ElementTest {
+        material: place,
+        path,
+        confining: confining?,
+        strain: strain.unwrap_or(0.0),
+        steps: steps?,
+        history: history.iter().map(|strain| [strain[0], strain[1], strain[2]]).collect(),
+    })
+}
