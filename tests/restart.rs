@@ -647,6 +647,14 @@ fn state_of_a_hardening_material_goes_with_its_points() {
             }
         }
     }
+    // Steps that are cut count what they keep, and nothing else.
+    let cut = ["--set", "analysis.steps=3", "--set", "analysis.max_iterations=6"];
+    run_well(2, &deck, &at("cut".into()), &[&hardens[..], &cut].concat());
+    let end = points_of(&at("cut".into()).join("checkpoint-000003.h5"));
+    assert!(fs::read_to_string(at("cut".into()).join("log.txt")).unwrap().contains("refused"));
+    for (word, norm) in end["state"].iter().zip(&end["plastic_strain"]) {
+        assert!((word - norm * (2.0_f64 / 3.0).sqrt()).abs() < 1e-12, "{word} {norm}");
+    }
     // Without hardening the digits are those of the perfect law, and nothing is carried.
     run_well(1, &deck, &at("perfect".into()), &[]);
     let perfect = points_of(&at("perfect".into()).join("checkpoint-000006.h5"));

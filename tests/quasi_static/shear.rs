@@ -37,6 +37,19 @@ fn elastic_stress_is_the_hencky_solution() {
     }
 }
 
+/// tau_xy = mu gamma and tau_xx = mu gamma^2, the lateral stress being none.
+#[test]
+fn neo_hookean_stress_is_the_closed_form() {
+    let rubber = "material.block={ model = \"neo-hookean\", young = 10e3, poisson = 0.3 }";
+    let run = basis("mpm")
+        .ranks(2)
+        .set(rubber)
+        .set("verify.0.exact=\"10e3/2.6*6*s\"")
+        .set("verify.1.exact=\"10e3/2.6*36*s*s\"");
+    // The normal stress is ten times Young's modulus.
+    assert!(elastic_error(&run) < 100.0 * ROUND_OFF);
+}
+
 #[test]
 fn stretched_domains_grow_out_of_the_block_and_spoil_the_stress() {
     let error = elastic_error(&gimp("stretch"));
