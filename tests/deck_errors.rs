@@ -64,7 +64,8 @@ beam.toml:29:1: material.steel.density: unknown key \"density\"
     | ^^^^^^^
    = \"density\" belongs to [[body]]
    = known keys of [material.NAME]: model, young, poisson, yield, yield_stress, \
-shear_strength, friction, dilation, cohesion, tension, fit"
+shear_strength, hardening, saturation, friction, dilation, cohesion, tension, fit, slope, \
+compression, swelling, preconsolidation, ocr, elasticity, reference_pressure, shear"
     );
 }
 
@@ -141,7 +142,7 @@ beam.toml:19:2: gird: unknown key \"gird\"
     |  ^^^^
    = did you mean \"grid\"?
    = known keys of the top level: title, analysis, method, ghost, grid, material, body, boundary, \
-load, verify, output, parallel, petsc, conditioning
+load, verify, output, parallel, petsc, conditioning, element_test
 beam.toml: grid: missing section [grid]
    = Background grid."
     );

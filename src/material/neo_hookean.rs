@@ -3,16 +3,8 @@
 //! tau_a = d W / d ln l_a = mu (l_a^2 - 1) + lambda ln J.
 
 use super::mohr_coulomb::STIFF;
-use super::parameter::{Parameter, Range, between};
-use super::{MOST_STATE, Model, Response};
-
-/// Below zero the stress does not say the strain.
-const POISSON: Parameter = Parameter::new(
-    "poisson",
-    "",
-    Range { high_included: false, ..between(0.0, 0.5) },
-    "Poisson's ratio at small strain.",
-);
+use super::parameter::{POISSON, Parameter};
+use super::{MOST_STATE, Misfit, Model, Response};
 
 /// Largest number of Newton steps from stress to strain.
 const MOST_ITERATIONS: usize = 100;
@@ -47,6 +39,15 @@ impl Model for NeoHookean {
     const DOC: &'static str = "Compressible neo-Hookean elasticity, mu/2 (tr b - 3) - mu ln J + \
         lambda/2 (ln J)^2 per initial volume (Bonet and Wood 2008, eq. 6.27).";
     const PARAMETERS: &'static [Parameter] = &[STIFF, POISSON];
+
+    /// Below zero a stress does not say its strain.
+    fn check(p: &[f64]) -> Result<(), Misfit> {
+        if p[1] < 0.0 {
+            let why = format!("expected a number >= 0 with this model, found {}", p[1]);
+            return Err(Misfit { key: "poisson", why });
+        }
+        Ok(())
+    }
 
     fn new(p: &[f64]) -> Self {
         let (young, poisson) = (p[0], p[1]);
