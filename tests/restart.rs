@@ -636,7 +636,8 @@ fn state_of_a_hardening_material_goes_with_its_points() {
         let middle = at(format!("whole-{wrote}")).join("checkpoint-000003.h5");
         for goes_on in 1..=3 {
             let part = at(format!("part-{wrote}-{goes_on}"));
-            let words = [&hardens[..], &["--restart", &middle.display().to_string()]].concat();
+            let middle = middle.display().to_string();
+            let words = [&hardens[..], &["--restart", &middle]].concat();
             run_well(goes_on, &deck, &part, &words);
             let end = points_of(&part.join("checkpoint-000006.h5"));
             let (error, field) = difference(&reference, &end);
