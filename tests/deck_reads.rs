@@ -73,7 +73,7 @@ fn ghost_factors(text: &str, sets: &[&str]) -> Option<(Option<f64>, Option<f64>)
 
 #[test]
 fn ghost_is_on_unless_it_is_turned_off() {
-    let (stiffness, mass) = (Some(0.01), Some(0.25));
+    let (stiffness, mass, implicit) = (Some(0.01), Some(0.25), Some(0.01));
     for (text, sets, expected) in [
         (BEAM, &["ghost="][..], Some((stiffness, None))),
         (BEAM, &["ghost.stiffness="], Some((stiffness, None))),
@@ -81,7 +81,7 @@ fn ghost_is_on_unless_it_is_turned_off() {
         (BEAM, &["ghost=\"off\""], None),
         // A table with one of the two says all.
         (CUBE, &["ghost=off", "ghost.mass_factor=0.5"], Some((None, Some(0.5)))),
-        (CUBE, &[], Some((stiffness, mass))),
+        (CUBE, &[], Some((stiffness, implicit))),
         (CUBE, &["method.mass=lumped"], Some((stiffness, None))),
         (DYNAMIC, &["ghost="], Some((None, mass))),
         (DYNAMIC, &["ghost=", "method.mass=lumped"], None),

@@ -1,7 +1,7 @@
 //! What figures of a plan tell of slips: of units, by ratios that have no unit, and of sizes.
 
 use crate::analysis::time_steps::{TimeSteps, stability_limit};
-use crate::deck::model::{Every, Load};
+use crate::deck::model::{AnalysisType, Every, Load};
 use crate::deck::rough;
 use crate::loads::Moment;
 use crate::parallel::World;
@@ -125,6 +125,31 @@ pub fn steps<const D: usize>(
         rough(steps.round())
     );
     (Some(text), steps)
+}
+
+/// A warning of an explicit time step beyond the stability limit of full cells. Collective.
+pub fn unstable_step<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> Option<String> {
+    let analysis = &model.deck.analysis;
+    if analysis.kind != AnalysisType::Explicit {
+        return None;
+    }
+    let limit = stability_limit(world, model, points).0;
+    let dt = match (analysis.steps, analysis.duration) {
+        (Some(steps), Some(duration)) => duration / steps as f64,
+        _ => analysis.cfl? * limit,
+    };
+    (dt > limit).then(|| {
+        format!(
+            "the time step {} s is above the stability limit of full cells, {} s; take more \
+             analysis.steps, or analysis.cfl = 0.5 in their place",
+            rough(dt),
+            rough(limit)
+        )
+    })
 }
 
 /// Frames that a run of so many steps writes, the first state among them.

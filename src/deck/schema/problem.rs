@@ -144,7 +144,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "ghost",
         header: "[ghost]",
-        doc: "Ghost stabilisation (Ghost §3). Without this table, or without a stiffness and a mass in it, the default factors are in force: stiffness_factor = 0.01 in implicit analyses, and mass_factor = 0.25 in dynamics with the consistent mass (a conditioning study takes both). Nothing is stabilised in explicit analyses with the lumped mass, with method.control = \"fem\", and with `ghost = \"off\"`. A table with a stiffness or a mass says all: what it leaves out is not stabilised. An absolute value or a factor, not both. How the defaults were chosen: docs/evidence/ghost-factors.md.",
+        doc: "Ghost stabilisation (Ghost §3). Without this table, or without a stiffness and a mass in it, the default factors are in force: stiffness_factor = 0.01 in implicit analyses, and with the consistent mass mass_factor = 0.25 in explicit and 0.01 in implicit dynamics (a conditioning study takes 0.01 and 0.25). Nothing is stabilised in explicit analyses with the lumped mass, with method.control = \"fem\", and with `ghost = \"off\"`. A table with a stiffness or a mass says all: what it leaves out is not stabilised. An absolute value or a factor, not both. How the defaults were chosen: docs/evidence/ghost-factors.md.",
         keys: &[
             key("stiffness", Number, Optional("no Ghost stiffness"), "gamma_K.")
                 .unit("Pa").range(at_least(0.0))

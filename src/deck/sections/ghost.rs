@@ -87,7 +87,10 @@ impl Wanted {
             stiffness: None,
             stiffness_factor: stiffens.then_some(Ghost::STIFFNESS_FACTOR),
             mass: None,
-            mass_factor: weighs.then_some(Ghost::MASS_FACTOR),
+            mass_factor: weighs.then_some(match kind {
+                AnalysisType::ImplicitDynamic => Ghost::IMPLICIT_MASS_FACTOR,
+                _ => Ghost::MASS_FACTOR,
+            }),
             scaling,
         })
     }
