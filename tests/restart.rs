@@ -503,7 +503,10 @@ fn extensions_that_change_the_problem_are_refused() {
     );
     let long = ["analysis.steps=16", "analysis.duration=0.0625"];
     refused("moved", &moved, &long, &["`steps = 8`", "totals over the whole", "formulas of t"]);
-    let still = FALL.replace("KIND", "quasi-static").replace("duration = 0.03125\n", "");
+    let still = FALL
+        .replace("KIND", "quasi-static")
+        .replace("duration = 0.03125\n", "")
+        .replace("mass = \"lumped\"\n", "");
     refused("still", &still, &["analysis.steps=16"], &["`steps = 8`", "totals over the whole"]);
 }
 

@@ -18,6 +18,11 @@ fn gimp(update: &str) -> Run {
     basis("gimp").set(format!("method.domain_update=\"{update}\""))
 }
 
+/// `stretch` domains, of which the published functions lose what lies beyond the grid's edge.
+fn stretched() -> Run {
+    gimp("stretch").set("method.gimp_edge=\"published\"")
+}
+
 fn plastic(run: Run) -> Run {
     run.set("material.block.model=\"von-mises\"").set(format!("material.block.yield={YIELD:?}"))
 }
@@ -52,8 +57,11 @@ fn neo_hookean_stress_is_the_closed_form() {
 
 #[test]
 fn stretched_domains_grow_out_of_the_block_and_spoil_the_stress() {
-    let error = elastic_error(&gimp("stretch"));
+    let error = elastic_error(&stretched());
     assert!(error > 0.05, "no defect: {error:e}");
+    // Functions that go on beyond the edge lose nothing.
+    let error = elastic_error(&gimp("stretch"));
+    assert!(error < ROUND_OFF, "{error:e}");
 }
 
 /// tau_xx = -tau_yy and tau_xy of the von Mises material after each of `steps` equal increments to
@@ -103,7 +111,7 @@ fn plastic_stress_follows_the_return_mapping_step_by_step() {
             }
         }
     }
-    let spoiled = plastic(gimp("stretch")).results().points(STEPS).component("stress", 0);
+    let spoiled = plastic(stretched()).results().points(STEPS).component("stress", 0);
     assert!(spoiled.iter().any(|value| (value - path[29][0]).abs() > 0.05 * YOUNG));
 }
 
