@@ -21,10 +21,10 @@ pub struct Basics {
 
 /// The deck of an element test. Its grid is one cell that nothing reads.
 pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
-    let names: Vec<&str> =
-        basics.materials.iter().flatten().map(|material| material.name.as_str()).collect();
+    let named = |all: &Vec<Material>| all.iter().map(|one| one.name.clone()).collect();
+    let names: Option<Vec<String>> = basics.materials.as_ref().ok().map(named);
     let test = if root.given("element_test") {
-        root.table("element_test", |table| element_test(&table, &names))
+        root.table("element_test", |table| element_test(&table, names.as_deref()))
     } else {
         Err(root.missing("element_test", "analysis.type = \"element-test\" needs it"))
     };
@@ -64,8 +64,8 @@ pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
     })
 }
 
-/// `names` of the materials, those that could be read.
-fn element_test(table: &Table<'_>, names: &[&str]) -> Got<ElementTest> {
+/// `names` of the materials, if they could be read: else their own faults are told alone.
+fn element_test(table: &Table<'_>, names: Option<&[String]>) -> Got<ElementTest> {
     let material = table.text("material");
     let path: Got<ElementPath> = table.choice("path");
     let confining = table.number("confining");
@@ -85,10 +85,12 @@ fn element_test(table: &Table<'_>, names: &[&str]) -> Got<ElementTest> {
         }
     }
     let material = material?;
-    let Some(place) = names.iter().position(|name| *name == material) else {
+    let place = names.map(|names| (names, names.iter().position(|name| *name == material)));
+    if let Some((names, None)) = place {
         let known = names.join(", ");
         return Err(table.problem("material", format!("no [material.{material}]; known: {known}")));
-    };
+    }
+    let place = place.and_then(|(_, place)| place).unwrap_or(0);
     Ok(ElementTest {
         material: place,
         path,
