@@ -210,8 +210,11 @@ impl<'a, const D: usize> Nodes<'a, D> {
         };
         deforming.iter_mut().for_each(|v| *v *= self.dt);
         let deformation = mapping::displacement_gradients(step, &deforming);
-        update::require_sound_deformation(self.world, points, &deformation)?;
-        let energies = update::deform(&self.model.materials, &deformation, points, Some(before));
+        let averaged = update::averaged(step, &deforming, &deformation);
+        update::require_sound_deformation(self.world, points, &deformation, &averaged)?;
+        let straining = if averaged.is_empty() { &deformation } else { &averaged };
+        update::stretch(&deformation, points, Some(before));
+        let energies = update::respond(&self.model.materials, straining, points, Some(before));
         Ok((deformation, energies))
     }
 

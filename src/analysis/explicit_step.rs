@@ -114,7 +114,7 @@ pub(crate) fn advance<const D: usize>(
         let followed = update::follow(model, numbering, &moved, &made, points, Some(before));
         let overgrown = world.fail_together(followed)?;
         let energies = energies.unwrap_or_else(|| {
-            update::respond(&model.materials, &made.deformation, points, Some(before))
+            update::respond(&model.materials, made.straining(), points, Some(before))
         });
         update::move_points(&made.displacement, points, Some(before));
         before.velocity.replace(&mut points.velocity, new_velocity);
@@ -158,9 +158,14 @@ fn increments<const D: usize>(
     if deformation.is_none() && deforming == moved {
         return update::increments(step, moved);
     }
+    // With the stress updated first, b_e has followed already.
+    let later = deformation.is_none();
+    let deformation =
+        deformation.unwrap_or_else(|| mapping::displacement_gradients(step, deforming));
+    let averaged = if later { update::averaged(step, deforming, &deformation) } else { Vec::new() };
     Increments {
-        deformation: deformation
-            .unwrap_or_else(|| mapping::displacement_gradients(step, deforming)),
+        deformation,
+        averaged,
         displacement: mapping::at_points(step, moved),
         corners: Vec::new(),
     }
@@ -181,6 +186,7 @@ fn refuse<const D: usize>(
     let usf = method.stress_update == StressUpdate::Usf;
     let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
         deformation: vec![[[0.0; D]; D]; points.len()],
+        averaged: Vec::new(),
         displacement: made.displacement.clone(),
         corners: Vec::new(),
     });

@@ -74,6 +74,7 @@ pub fn solve<const D: usize>(
     let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
     let stabilised = model.stabilised();
     let size = Size {
+        shape: solver::Shape::of(model, problem.symmetric()),
         equations: numbering.total * D,
         stabilised,
         // Domains leave cells with more nodes than the corners in them tell apart.
@@ -150,6 +151,7 @@ pub fn carried<const D: usize>(
 /// What the choice of a linear solver reads.
 #[derive(Clone, Copy)]
 struct Size {
+    shape: solver::Shape,
     /// Over all ranks.
     equations: usize,
     stabilised: bool,
@@ -167,10 +169,10 @@ fn solve_robustly<const D: usize>(
     matrix: &mut Matrix,
     solution: &mut Vector,
 ) -> Result<(NewtonOutcome, Option<String>)> {
-    let Size { equations, stabilised, null_pivots } = size;
+    let Size { shape, equations, stabilised, null_pivots } = size;
     let linear = Linear::of::<D>(equations, stabilised, trials)?;
-    let (most, symmetric) = (problem.settings().max_evaluations, problem.symmetric());
-    let mut snes = solver::newton(world, linear, symmetric, null_pivots, most)?;
+    let most = problem.settings().max_evaluations;
+    let mut snes = solver::newton(world, linear, shape, null_pivots, most)?;
     let outcome = snes.solve(problem, matrix, solution)?;
     trials.note(linear, !outcome.converged);
     let stronger = linear.stronger::<D>(equations, outcome.linear_failure);
@@ -178,7 +180,7 @@ fn solve_robustly<const D: usize>(
         return Ok((outcome, None));
     };
     let before = snes.ksp()?.describe()?;
-    let mut snes = solver::newton(world, stronger, symmetric, null_pivots, most)?;
+    let mut snes = solver::newton(world, stronger, shape, null_pivots, most)?;
     let after = snes.ksp()?.describe()?;
     if before == after {
         // The user's options chose both.

@@ -7,7 +7,7 @@
 //! direct solver sums in the order in which messages arrive; on one rank it repeats bit by bit, and
 //! is faster at these sizes too.
 
-use crate::deck::model::AnalysisType;
+use crate::deck::model::{AnalysisType, Locking, Tangent};
 use crate::error::Result;
 use crate::mass::inverse;
 use crate::output::restart::run_state::RunState;
@@ -120,8 +120,7 @@ impl Linear {
         self == Linear::DirectOnOne && ranks > 1
     }
 
-    /// Options without the prefix, on `ranks` ranks. An unsymmetric tangent comes with a line search
-    /// on the norm of the residual: the models that have one are not smooth.
+    /// Options without the prefix, on `ranks` ranks.
     pub fn options(self, ranks: usize, symmetric: bool) -> Vec<(&'static str, String)> {
         const PACKAGE: &str = "mumps";
         let list: &[(&str, &str)] = match self {
@@ -158,10 +157,6 @@ impl Linear {
             Linear::Trial => options.push(("ksp_max_it", TRIAL.to_string())),
             Linear::Direct | Linear::DirectOnOne => {}
         }
-        if !symmetric {
-            options.push(("snes_linesearch_type", "bt".into()));
-            options.push(("snes_linesearch_alpha", GROWTH.into()));
-        }
         if self.gathers(ranks) {
             options.push(("pc_telescope_reduction_factor", ranks.to_string()));
         }
@@ -169,19 +164,41 @@ impl Linear {
     }
 }
 
+/// What the tangent asks of Newton's method.
+#[derive(Debug, Clone, Copy)]
+pub struct Shape {
+    /// It equals its transposed.
+    pub symmetric: bool,
+    /// A line search follows each solve. Not for F-bar alone: the volume of an iterate is off by the
+    /// square of its rotation, a bulk modulus times which may be a hundred times the loads, and full
+    /// steps are past that in one iteration.
+    pub search: bool,
+}
+
+impl Shape {
+    /// `symmetric`: all terms of the equations are.
+    pub fn of<const D: usize>(model: &Model<D>, symmetric: bool) -> Self {
+        let deck = &model.deck;
+        let mild = deck.method.locking == Locking::FBar
+            && deck.analysis.tangent == Tangent::Auto
+            && model.symmetric;
+        Shape { symmetric, search: !symmetric && !mild }
+    }
+}
+
 /// Of the options of the equilibrium solver.
 const PREFIX: &str = "qs_";
 
-/// Newton's method with a built-in linear solver. `symmetric`: the tangent is; `null_pivots`: the
-/// system may be singular and consistent, and a direct solver has to look for zero pivots.
+/// Newton's method with a built-in linear solver. `null_pivots`: the system may be singular and
+/// consistent, and a direct solver has to look for zero pivots.
 pub fn newton(
     world: &World,
     linear: Linear,
-    symmetric: bool,
+    shape: Shape,
     null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
-    newton_under(PREFIX, world, linear, symmetric, null_pivots, max_evaluations)
+    newton_under(PREFIX, world, linear, shape, null_pivots, max_evaluations)
 }
 
 /// The same with options of another prefix.
@@ -189,12 +206,16 @@ fn newton_under(
     prefix: &str,
     world: &World,
     linear: Linear,
-    symmetric: bool,
+    shape: Shape,
     null_pivots: bool,
     max_evaluations: usize,
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), prefix, max_evaluations.saturating_sub(1).max(1))?;
-    let mut defaults = linear.options(world.size(), symmetric);
+    let mut defaults = linear.options(world.size(), shape.symmetric);
+    if shape.search {
+        defaults.push(("snes_linesearch_type", "bt".into()));
+        defaults.push(("snes_linesearch_alpha", GROWTH.into()));
+    }
     if !factors(prefix)? {
         // Mumps has no others than those of LU and Cholesky.
         defaults.retain(|(name, _)| *name != "pc_factor_mat_solver_type");
@@ -233,8 +254,8 @@ pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usiz
     }
     let Some(rehearsal) = Rehearsal::new(PREFIX)? else { return Ok(()) };
     let linear = Linear::of::<D>(equations, model.stabilised(), &Trials::default())?;
-    let symmetric = model.symmetric();
-    rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, symmetric, false, 3))
+    let shape = Shape::of(model, model.symmetric());
+    rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, shape, false, 3))
 }
 
 /// The system's matrix, still zero, with its block size and near-null space. Collective.

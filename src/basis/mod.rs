@@ -8,9 +8,11 @@
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
+//! | `locking` | `centre.rs` | gradients at the centres of cells, for F-bar |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
+pub mod centre;
 pub mod domain;
 pub mod gimp;
 pub mod groups;
@@ -48,6 +50,8 @@ pub struct Influences<const D: usize> {
     pub weights: Vec<f64>,
     /// 1/m
     pub gradients: Vec<[f64; D]>,
+    /// Gradients at cell centres of the same entries ([`centre`]), 1/m; empty without F-bar.
+    pub centre_gradients: Vec<[f64; D]>,
     /// Where the nodes come from, of bases that collect them place by place.
     pub cells: Cells,
 }
@@ -92,6 +96,7 @@ impl<const D: usize> Influences<D> {
             nodes: Vec::with_capacity(entries),
             weights: Vec::with_capacity(entries),
             gradients: Vec::with_capacity(entries),
+            centre_gradients: Vec::new(),
             cells: Cells::default(),
         }
     }

@@ -166,6 +166,7 @@ pub struct Method {
     pub domain_update: DomainUpdate,
     pub gimp_edge: GimpEdge,
     pub point_volume: PointVolume,
+    pub locking: Locking,
     pub frame: Frame,
     pub mass: Mass,
     pub stress_update: StressUpdate,
@@ -207,6 +208,15 @@ pub enum PointVolume {
     Deformation,
     /// That of the GIMP domain, as in the program behind Lagrangian §7.
     Domain,
+}
+
+/// What keeps points from locking where the volume can hardly change.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Locking {
+    #[default]
+    None,
+    /// Stress from dF_bar = (det dF_0 / det dF)^(1/n) dF, dF_0 at the centres of cells.
+    FBar,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -136,6 +136,7 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     w.line("method", "domain_update", quote(m.domain_update.name()));
     w.line("method", "gimp_edge", quote(m.gimp_edge.name()));
     w.line("method", "point_volume", quote(m.point_volume.name()));
+    w.line("method", "locking", quote(m.locking.name()));
     // What `control = "fem"` stands for is written out in grid.motion and body.gauss.
     w.line("method", "control", quote("off"));
     w.line("method", "frame", quote(m.frame.name()));

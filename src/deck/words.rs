@@ -2,8 +2,8 @@
 
 use super::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
-    Initial, InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
-    VerifyNorm,
+    Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate,
+    Tangent, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -62,6 +62,7 @@ words! {
     }
     GimpEdge { "continued" => Continued, "published" => Published }
     PointVolume { "deformation" => Deformation, "domain" => Domain }
+    Locking { "none" => None, "f-bar" => FBar }
     Frame { "previous" => Previous, "updated" => Updated, "total" => Total }
     Mass { "consistent" => Consistent, "lumped" => Lumped }
     StressUpdate { "usf" => Usf, "usl" => Usl, "musl" => Musl }

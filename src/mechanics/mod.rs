@@ -10,8 +10,10 @@
 //! |---|---|
 //! | `mod.rs` | what the assembly sees |
 //! | `update.rs` | trial strain, material, new elastic strain: in principal axes |
+//! | `dilation.rs` | F-bar: the change of volume at the centres of cells |
 //! | `tangent.rs` | from principal moduli to A_ijkl of a frame |
 
+pub mod dilation;
 mod tangent;
 mod update;
 
@@ -20,6 +22,7 @@ mod paper_tests;
 #[cfg(test)]
 mod tests;
 
+pub use dilation::Dilation;
 pub use update::BATCH;
 
 use nalgebra::Matrix3;
@@ -106,6 +109,29 @@ pub fn contribution<const D: usize>(
         volume: placement.volume,
     };
     (contribution, update.state(&start.material))
+}
+
+/// [`contribution`] with F-bar: `centre` is dF_0 - 1. The stress, its part of the tangent and the
+/// state are those of dF_bar, everything else that of dF.
+#[inline]
+pub fn averaged_contribution<const D: usize>(
+    frame: Frame,
+    start: &StepStart,
+    increment: &[[f64; D]; D],
+    centre: &[[f64; D]; D],
+) -> (Contribution<D>, Dilation<D>, StressState) {
+    let update = update::update(start, &dilation::averaged(increment, centre));
+    let placement = Placement::new(frame, start, &dense::plus_unit(increment));
+    let (stress, tangent) = tangent::pull_back(&update, &placement.back, placement.scale);
+    let rate = tangent::expansion(&update, &placement.back, placement.scale);
+    let contribution = Contribution {
+        stress,
+        tangent,
+        gradient_map: placement.gradient_map,
+        volume: placement.volume,
+    };
+    let dilation = Dilation::new(rate, increment, centre);
+    (contribution, dilation, update.state(&start.material))
 }
 
 /// How a frame y lies to the current state x: T_ij = scale tau_im (dy/dx)_jm.

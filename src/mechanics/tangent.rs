@@ -68,6 +68,23 @@ pub(crate) fn pull_back<const D: usize>(
     (frame_stress, tangent)
 }
 
+/// s H_jm dtau_im for L = 1 in the first `D` axes: sum_c c_ac n_a x (H n_a).
+#[inline]
+pub(crate) fn expansion<const D: usize>(
+    update: &Update,
+    back: &Square<D>,
+    scale: f64,
+) -> Square<D> {
+    let mut rate = [[0.0; D]; D];
+    for a in 0..D {
+        let here: [f64; D] = std::array::from_fn(|i| update.trial.axes[a][i]);
+        let there: [f64; D] = std::array::from_fn(|j| dot(&back[j], &here));
+        let modulus: f64 = update.response.tangent[a][..D].iter().sum();
+        add(&mut rate, scale * modulus, &here, &there);
+    }
+    rate
+}
+
 /// r_ab = (tau_a - tau_b) / (b_a - b_b), exact also where the values coincide.
 #[inline]
 fn shear_rate(update: &Update, a: usize, b: usize) -> f64 {

@@ -7,10 +7,11 @@
 //! | deck to points on their ranks | `setup.rs` |
 //! | parameters and state of the points' materials | `materials.rs` |
 //! | what is checked before anything is written | `start_checks/` |
-//! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs` |
+//! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs`, `locking.rs` |
 //! | the process that MPI starts | `process.rs` |
 
 mod element_run;
+mod locking;
 mod materials;
 pub mod plan;
 mod plan_checks;

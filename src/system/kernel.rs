@@ -90,6 +90,27 @@ impl Batch {
         }
     }
 
+    /// Adds the product g_aj R_ij r_bk to the block of the point pushed last: what its stress T
+    /// does with a scalar that depends on the nodes. `rate` is R V, `row` holds r, (node, axis).
+    #[inline(always)]
+    pub fn push_product<const D: usize, const FUSED: bool>(
+        &mut self,
+        rate: &[[f64; D]; D],
+        row: &[[f64; D]],
+    ) {
+        let (stride, p) = (self.stride, self.points - 1);
+        let plane = self.capacity * D * stride;
+        for i in 0..D {
+            for j in 0..D {
+                let start = i * plane + (p * D + j) * stride;
+                let flux = &mut self.flux[start..start + self.nodes * D];
+                for (target, factors) in flux.iter_mut().zip(row.as_flattened()) {
+                    *target = multiply_add::<FUSED>(rate[i][j], *factors, *target);
+                }
+            }
+        }
+    }
+
     /// Adds the batch into the sparse rows and empties it. `rows` gives the address of each
     /// node's first value and the width of its scalar rows in values.
     #[inline(always)]

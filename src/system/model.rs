@@ -1,7 +1,7 @@
 //! The deck made computable: grid, partition, materials, penalties and loads of a run.
 
 use crate::deck::Deck;
-use crate::deck::model::Tangent;
+use crate::deck::model::{Locking, Tangent};
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::grid::Grid;
@@ -40,7 +40,10 @@ impl<const D: usize> Model<D> {
     /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the
     /// deck does not ask for the general path.
     pub fn symmetric(&self) -> bool {
-        self.deck.analysis.tangent == Tangent::Auto && self.symmetric
+        let deck = &self.deck;
+        deck.analysis.tangent == Tangent::Auto
+            && deck.method.locking == Locking::None
+            && self.symmetric
     }
 
     /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.

@@ -7,7 +7,7 @@ use crate::deck::model::Frame;
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 use super::scatter::BlockMatrix;
-use super::terms::stress::{StepPoints, displacement_gradient, respond};
+use super::terms::stress::{StepPoints, displacement_gradient, respond, respond_averaged};
 use super::terms::term::Health;
 
 /// As [`crate::system::terms::stress::assemble`], to rounding.
@@ -25,11 +25,23 @@ pub fn assemble<const D: usize>(
         let group = step.groups.group_of_point[p];
         let range = step.groups.node_offsets[group]..step.groups.node_offsets[group + 1];
         let nodes = &step.group_nodes[range];
-        let gradients = &step.influences.gradients[step.influences.row(p)];
-        let increment = displacement_gradient(gradients, |a| {
+        let row = step.influences.row(p);
+        let gradients = &step.influences.gradients[row.clone()];
+        let nodal = |a: usize| -> [f64; D] {
             std::array::from_fn(|i| displacement[nodes[a] as usize * D + i])
-        });
-        let Some(made) = respond(step, frame, p, &increment, &mut health) else { continue };
+        };
+        let increment = displacement_gradient(gradients, nodal);
+        let centres = step.influences.centre_gradients.get(row).unwrap_or_default();
+        let made = if centres.is_empty() {
+            respond(step, frame, p, &increment, &mut health).map(|made| (made, None))
+        } else {
+            let centre = displacement_gradient(centres, nodal);
+            respond_averaged(step, frame, p, [&increment, &centre], &mut health)
+                .map(|(made, dilation)| (made, Some(dilation)))
+        };
+        let Some((made, dilation)) = made else { continue };
+        let dilate = |b: usize| dilation.map(|d| (d.rate, d.row(&gradients[b], &centres[b])));
+        let products: Vec<_> = (0..gradients.len()).map(dilate).collect();
         let mapped: Vec<[f64; D]> = gradients
             .iter()
             .map(|g| std::array::from_fn(|j| (0..D).map(|i| g[i] * made.gradient_map[i][j]).sum()))
@@ -43,6 +55,10 @@ pub fn assemble<const D: usize>(
                         made.stress[i][j] * mapped[a][j] * made.volume;
                     for b in 0..count {
                         for k in 0..D {
+                            if let Some((rate, row)) = &products[b] {
+                                block[((a * D + i) * count + b) * D + k] +=
+                                    mapped[a][j] * rate[i][j] * row[k] * made.volume;
+                            }
                             for l in 0..D {
                                 block[((a * D + i) * count + b) * D + k] += mapped[a][j]
                                     * made.tangent[i][j][k][l]

@@ -10,7 +10,7 @@ use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use crate::basis::{self, Groups, Influences};
-use crate::deck::model::{Basis, PointVolume};
+use crate::deck::model::{Basis, Locking, PointVolume};
 use crate::error::Result;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
 use crate::grid::{FacePair, Grid};
@@ -97,6 +97,11 @@ impl<const D: usize> Discretisation<D> {
         };
         if basis == Basis::Mpm && coupling != Coupling::Matrix {
             face_points::settle(world, grid, partition, points, &mut influences)?;
+        }
+        if model.deck.method.locking == Locking::FBar {
+            let edge = model.deck.method.gimp_edge;
+            let centres = basis::centre::gradients(grid, basis, edge, points, &influences);
+            influences.centre_gradients = world.fail_together(centres)?;
         }
         let groups = Groups::new(&influences);
         let kinds = (basis, model.deck.bodies.len());

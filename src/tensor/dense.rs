@@ -75,6 +75,19 @@ pub fn determinant<const D: usize>(a: &Square<D>) -> f64 {
     }
 }
 
+/// det(1 + a) - 1, which keeps the digits of small `a`.
+#[inline]
+pub fn determinant_excess<const D: usize>(a: &Square<D>) -> f64 {
+    let minor = |i: usize, j: usize| a[i][i] * a[j][j] - a[i][j] * a[j][i];
+    match D {
+        2 => a[0][0] + a[1][1] + minor(0, 1),
+        _ => {
+            let minors = minor(0, 1) + minor(1, 2) + minor(0, 2);
+            a[0][0] + a[1][1] + a[2][2] + (minors + determinant(a))
+        }
+    }
+}
+
 /// Inverse and determinant; a singular tensor gives entries that are not finite.
 #[inline]
 pub fn inverse<const D: usize>(a: &Square<D>) -> (Square<D>, f64) {
@@ -136,6 +149,20 @@ mod tests {
         assert!((embed(&inverse, 0.0) * a - Matrix3::identity()).norm() < 1e-15);
         let v = apply(&A, &[1.0, 2.0, 3.0]);
         assert!((v[0] - 1.5).abs() < 1e-15 && (v[2] - 9.6).abs() < 1e-14);
+    }
+
+    #[test]
+    fn excess_is_the_determinant_less_one() {
+        for scale in [1.0, 0.1] {
+            let space = A.map(|row| row.map(|v| scale * v));
+            let whole = determinant(&plus_unit(&space)) - 1.0;
+            assert!((determinant_excess(&space) - whole).abs() < 1e-13);
+            let plane = [[space[0][0], space[0][1]], [space[1][0], space[1][1]]];
+            let whole = determinant(&plus_unit(&plane)) - 1.0;
+            assert!((determinant_excess(&plane) - whole).abs() < 1e-14);
+        }
+        // 3e-20 would be lost beside one.
+        assert_eq!(determinant_excess(&[[1e-20, 0.0], [0.0, 2e-20]]), 3e-20);
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::deck::schema::{AXES, SIDES};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::material::{Material, local};
-use crate::mechanics::{self, BATCH, StepStart, StressState};
+use crate::mechanics::{self, BATCH, StepStart, StressState, dilation};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::model::Model;
@@ -29,10 +29,19 @@ use crate::points::former::Former;
 pub struct Increments<const D: usize> {
     /// dF - 1
     pub deformation: Vec<[[f64; D]; D]>,
+    /// dF_bar - 1, what stress and b_e follow; empty without F-bar, where dF does it.
+    pub averaged: Vec<[[f64; D]; D]>,
     /// m
     pub displacement: Vec<[f64; D]>,
     /// Where the corners of `cpdi2` domains go, m; empty until [`require_sound_domains`] has found it.
     pub corners: Vec<[[f64; D]; 8]>,
+}
+
+impl<const D: usize> Increments<D> {
+    /// Of dF - 1 and dF_bar - 1 the one that stress and b_e follow.
+    pub fn straining(&self) -> &[[[f64; D]; D]] {
+        if self.averaged.is_empty() { &self.deformation } else { &self.averaged }
+    }
 }
 
 /// Energies of this rank's points, J (J/m in plane strain).
@@ -49,6 +58,7 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
     let count = step.points.len();
     let mut made = Increments {
         deformation: Vec::with_capacity(count),
+        averaged: Vec::new(),
         displacement: Vec::with_capacity(count),
         corners: Vec::new(),
     };
@@ -69,7 +79,29 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
         }
         made.displacement.push(moved);
     }
+    made.averaged = averaged(step, displacement, &made.deformation);
     made
+}
+
+/// dF_bar - 1 at each point, from the increments that made `deformation`; empty without F-bar.
+pub fn averaged<const D: usize>(
+    step: StepPoints<'_, D>,
+    displacement: &[f64],
+    deformation: &[[[f64; D]; D]],
+) -> Vec<[[f64; D]; D]> {
+    let centres = &step.influences.centre_gradients;
+    if centres.is_empty() {
+        return Vec::new();
+    }
+    let of_point = |(p, increment): (usize, &[[f64; D]; D])| {
+        let nodes = step.nodes_of(p);
+        let centre = displacement_gradient(&centres[step.influences.row(p)], |a| {
+            let start = nodes[a] as usize * D;
+            std::array::from_fn(|i| displacement[start + i])
+        });
+        dilation::averaged(increment, &centre)
+    };
+    deformation.iter().enumerate().map(of_point).collect()
 }
 
 /// How a refusal says that no boundary keeps points from leaving through a side.
@@ -92,7 +124,8 @@ pub fn require_sound<const D: usize>(
         if moved.iter().any(|m| !m.is_finite()) {
             return Some(Fault::NotFinite);
         }
-        let fault = fault_of(&increments.deformation[p]);
+        let averaged = increments.averaged.get(p);
+        let fault = fault_of(&increments.deformation[p], averaged);
         fault.or_else(|| {
             near.set(grid.locate_near(&moved, near.get()));
             let leaves =
@@ -141,8 +174,9 @@ pub fn require_sound_deformation<const D: usize>(
     world: &World,
     points: &Points<D>,
     deformation: &[[[f64; D]; D]],
+    averaged: &[[[f64; D]; D]],
 ) -> std::result::Result<(), Refusal> {
-    require(world, points, |p| fault_of(&deformation[p]))
+    require(world, points, |p| fault_of(&deformation[p], averaged.get(p)))
 }
 
 /// What is wrong with the increment of a point.
@@ -150,16 +184,25 @@ enum Fault {
     NotFinite,
     /// det dF
     Inverted(f64),
+    /// det dF_0 is not positive.
+    Centre,
     /// To where, m.
     Leaves(String),
 }
 
-fn fault_of<const D: usize>(increment: &[[f64; D]; D]) -> Option<Fault> {
+fn fault_of<const D: usize>(
+    increment: &[[f64; D]; D],
+    averaged: Option<&[[f64; D]; D]>,
+) -> Option<Fault> {
     let determinant = dense::determinant(&dense::plus_unit(increment));
     if !determinant.is_finite() {
         return Some(Fault::NotFinite);
     }
-    (determinant <= 0.0).then_some(Fault::Inverted(determinant))
+    if determinant <= 0.0 {
+        return Some(Fault::Inverted(determinant));
+    }
+    let finite = |h: &[[f64; D]; D]| h.as_flattened().iter().all(|v| v.is_finite());
+    averaged.is_some_and(|h| !finite(h)).then_some(Fault::Centre)
 }
 
 /// Refuses the first point of the lowest rank with a fault. Collective.
@@ -169,13 +212,16 @@ fn require<const D: usize>(
     fault: impl Fn(usize) -> Option<Fault>,
 ) -> std::result::Result<(), Refusal> {
     let found = (0..points.len()).find_map(|p| fault(p).map(|fault| (p, fault)));
-    let inverted = matches!(found, Some((_, Fault::Inverted(_))));
+    let inverted = matches!(found, Some((_, Fault::Inverted(_) | Fault::Centre)));
     let not_finite = matches!(found, Some((_, Fault::NotFinite)));
     let message = found.map(|(p, fault)| {
         let what = match fault {
             Fault::NotFinite => "has a displacement that is not finite".to_string(),
             Fault::Inverted(determinant) => {
                 format!("is turned inside out (det dF = {determinant:.3e})")
+            }
+            Fault::Centre => {
+                "is in cells whose centres are turned inside out (det dF_0 <= 0)".to_string()
             }
             Fault::Leaves(way) => format!("leaves the grid {way}"),
         };
@@ -258,22 +304,11 @@ pub fn apply<const D: usize>(
     points: &mut Points<D>,
     mut before: Option<&mut Snapshot<D>>,
 ) -> Result<()> {
-    deform(&model.materials, &increments.deformation, points, before.as_deref_mut());
+    stretch(&increments.deformation, points, before.as_deref_mut());
+    respond(&model.materials, increments.straining(), points, before.as_deref_mut());
     follow(model, numbering, displacement, increments, points, before.as_deref_mut())?;
     move_points(&increments.displacement, points, before);
     Ok(())
-}
-
-/// F, b_e, stress and history for the increments dF - 1 (Lagrangian eq. 16); returns the energies
-/// of the new state, all but the kinetic one.
-pub fn deform<const D: usize>(
-    materials: &[Material],
-    increments: &[[[f64; D]; D]],
-    points: &mut Points<D>,
-    mut before: Option<&mut Snapshot<D>>,
-) -> PointEnergies {
-    stretch(increments, points, before.as_deref_mut());
-    respond(materials, increments, points, before)
 }
 
 /// F of the increments dF - 1 alone: what [`follow`] reads.
@@ -323,7 +358,8 @@ fn overwrite<T: Copy, W>(
     }
 }
 
-/// b_e, stress and history of the increments dF - 1; energies as [`deform`] returns them.
+/// b_e, stress and history of the increments dF - 1 (Lagrangian eq. 16); returns the energies of the
+/// new state, all but the kinetic one.
 pub fn respond<const D: usize>(
     materials: &[Material],
     increments: &[[[f64; D]; D]],

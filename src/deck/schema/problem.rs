@@ -12,8 +12,8 @@ use super::{
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
-    Initial, InvertedIterates, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate, Tangent,
-    VerifyNorm,
+    Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate,
+    Tangent, VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -118,6 +118,9 @@ pub const SECTIONS: &[Section] = &[
             key("point_volume", Choice(PointVolume::NAMES), Default("\"deformation\""),
                 "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none).")
                 .read_by(&[GIMP, QUASI_STATIC]),
+            key("locking", Choice(Locking::NAMES), Default("\"none\""),
+                "f-bar: stresses from dF with the change of volume at the centres of the cells that a point touches, for Poisson's ratios near 0.5 and plastic flow without change of volume (bases mpm and gimp). The tangent is then unsymmetric. Triangles and tetrahedra gain nothing.")
+                .read_by(&[LOADED]),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
                 "State in which equilibrium is written (Lagrangian §3-5).")
                 .read_by(&[IMPLICIT]),

@@ -1,6 +1,6 @@
 //! `[analysis]`, `[method]`, `[conditioning]`.
 
-use crate::deck::model::{Analysis, AnalysisType, Basis, Mass, Method};
+use crate::deck::model::{Analysis, AnalysisType, Basis, Locking, Mass, Method};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::between;
@@ -111,6 +111,7 @@ pub fn method(
     let domain_update = table.choice("domain_update");
     let gimp_edge = table.choice("gimp_edge");
     let point_volume = table.choice("point_volume");
+    let locking = table.choice("locking");
     let frame = table.choice("frame");
     let mass = table.choice("mass");
     let stress_update = table.choice("stress_update");
@@ -137,7 +138,17 @@ pub fn method(
         ));
     }
     let mass = if xpic { Mass::Lumped } else { mass };
-    let (basis, point_volume) = (basis?, point_volume?);
+    let (basis, point_volume, locking) = (basis?, point_volume?, locking?);
+    if locking == Locking::FBar && !matches!(basis, Basis::Mpm | Basis::Gimp) {
+        return Err(table.problem(
+            "locking",
+            format!(
+                "\"f-bar\" is for basis = \"mpm\" and basis = \"gimp\", found \"{}\": take one of them, \
+                 or locking = \"none\"",
+                basis.name()
+            ),
+        ));
+    }
     // Explicit steps keep every node that has mass: dropping one would lose its momentum.
     let keeps_all = stiffened || kind == Some(AnalysisType::Explicit);
     Ok(Method {
@@ -145,6 +156,7 @@ pub fn method(
         domain_update: domain_update?,
         gimp_edge: gimp_edge?,
         point_volume,
+        locking,
         frame: frame?,
         mass,
         stress_update: stress_update?,

@@ -6,7 +6,7 @@ use std::ops::Range;
 use crate::basis::{Groups, Influences};
 use crate::deck::model::{Frame, PointVolume};
 use crate::material::{Material, local};
-use crate::mechanics::{self, Contribution, StepStart};
+use crate::mechanics::{self, Contribution, Dilation, StepStart, StressState};
 use crate::points::Points;
 use crate::tensor::dense;
 use crate::tensor::fused::{self, multiply_add};
@@ -264,9 +264,37 @@ impl<const D: usize> Task<'_, D> {
         with_block: bool,
     ) {
         let step = self.step;
-        let gradients = &step.influences.gradients[step.influences.row(p)];
+        let row = step.influences.row(p);
+        let gradients = &step.influences.gradients[row.clone()];
         let increment = displacement_gradient(gradients, |a| work.displacement[a]);
+        if !step.influences.centre_gradients.is_empty() {
+            let centres = &step.influences.centre_gradients[row];
+            let centre = displacement_gradient(centres, |a| work.displacement[a]);
+            let made = respond_averaged(step, self.frame, p, [&increment, &centre], health);
+            let Some((contribution, dilation)) = made else { return };
+            self.spread::<FUSED>(gradients, &contribution, work, with_block);
+            if with_block {
+                let rows = gradients.iter().zip(centres);
+                work.gradients.clear();
+                work.gradients.extend(rows.map(|(g, centre)| dilation.row(g, centre)));
+                let rate = dilation.rate.map(|row| row.map(|r| r * contribution.volume));
+                work.batch.push_product::<D, FUSED>(&rate, &work.gradients);
+            }
+            return;
+        }
         let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
+        self.spread::<FUSED>(gradients, &contribution, work, with_block);
+    }
+
+    /// Force and, with the block, the tangent A of a point.
+    #[inline(always)]
+    fn spread<const FUSED: bool>(
+        &self,
+        gradients: &[[f64; D]],
+        contribution: &Contribution<D>,
+        work: &mut Workspace<D>,
+        with_block: bool,
+    ) {
         let map = &contribution.gradient_map;
         let stress = contribution.stress.map(|row| row.map(|s| s * contribution.volume));
         work.gradients.clear();
@@ -285,7 +313,7 @@ impl<const D: usize> Task<'_, D> {
             work.gradients.push(mapped);
         }
         if with_block {
-            work.batch.push::<D, FUSED>(&work.gradients, &contribution);
+            work.batch.push::<D, FUSED>(&work.gradients, contribution);
         }
     }
 }
@@ -299,23 +327,51 @@ pub(crate) fn respond<const D: usize>(
     increment: &[[f64; D]; D],
     health: &mut Health,
 ) -> Option<Contribution<D>> {
+    let (contribution, state) = mechanics::contribution(frame, &start(step, p), increment);
+    sound(p, increment, &state, health).then_some(contribution)
+}
+
+/// [`respond`] with F-bar, to dF - 1 and dF_0 - 1 at the centres of cells.
+pub(crate) fn respond_averaged<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    [increment, centre]: [&[[f64; D]; D]; 2],
+    health: &mut Health,
+) -> Option<(Contribution<D>, Dilation<D>)> {
+    let (contribution, dilation, state) =
+        mechanics::averaged_contribution(frame, &start(step, p), increment, centre);
+    sound(p, increment, &state, health).then_some((contribution, dilation))
+}
+
+#[inline(always)]
+fn start<const D: usize>(step: StepPoints<'_, D>, p: usize) -> StepStart<'_> {
     let points = step.points;
-    let start = StepStart {
+    StepStart {
         material: local(step.materials, points, p),
         state: points.state.of(p, points.body[p]),
         deformation_gradient: &points.deformation_gradient[p],
         elastic_excess: &points.elastic_excess[p],
         volume_initial: start_volume(step, p),
-    };
-    let (contribution, state) = mechanics::contribution(frame, &start, increment);
+    }
+}
+
+/// Notes in `health` what is wrong with a point; false if its stress is not finite.
+#[inline(always)]
+fn sound<const D: usize>(
+    p: usize,
+    increment: &[[f64; D]; D],
+    state: &StressState,
+    health: &mut Health,
+) -> bool {
     if dense::determinant(&dense::plus_unit(increment)) <= 0.0 {
         health.inverted.get_or_insert(p);
     }
-    if !state.kirchhoff_stress.iter().all(|t| t.is_finite()) {
+    let finite = state.kirchhoff_stress.iter().all(|t| t.is_finite());
+    if !finite {
         health.not_finite.get_or_insert(p);
-        return None;
     }
-    Some(contribution)
+    finite
 }
 
 /// The initial volume that forces of point `p` are integrated over, m3.
