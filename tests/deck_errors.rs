@@ -306,6 +306,46 @@ fn checks_of_the_analysis_and_the_method() {
             ),
             (&["analysis.type=explicit", "method.velocity_update=flop"], "did you mean \"flip\"?"),
             (
+                &[
+                    "analysis.type=implicit-dynamic",
+                    "analysis.duration=1",
+                    "method.velocity_update=apic",
+                ],
+                "\"apic\" is for analysis.type = \"explicit\"",
+            ),
+            (
+                &["analysis.type=explicit", "method.velocity_update=apic", "method.basis=mpm"],
+                "zero on the faces of cells; use basis = \"gimp\"",
+            ),
+            (
+                &["analysis.type=explicit", "method.velocity_update=tpic", "method.basis=cpdi2"],
+                "velocity_update = \"tpic\" is not derived for CPDI domains; use basis = \"gimp\"",
+            ),
+            (
+                &[
+                    "analysis.type=explicit",
+                    "method.velocity_update=apic",
+                    "method.stress_update=usf",
+                ],
+                "where the stress is updated first; use \"musl\" or \"usl\"",
+            ),
+            (
+                &[
+                    "analysis.type=explicit",
+                    "method.velocity_update=apic",
+                    "method.mass=consistent",
+                ],
+                "\"apic\" is derived for mass = \"lumped\"; with mass = \"consistent\", \"flip\"",
+            ),
+            (
+                &[
+                    "analysis.type=explicit",
+                    "method.velocity_update=apic",
+                    "method.gimp_edge=published",
+                ],
+                "needs functions that sum to one; use \"continued\"",
+            ),
+            (
                 &["analysis.type=explicit", "method.position_update=publisht"],
                 "did you mean \"published\"?",
             ),

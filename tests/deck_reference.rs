@@ -104,7 +104,14 @@ fn resolved_deck_reads_back_to_the_same_deck() {
         }
     }
     let explicit = ["method.velocity_update=xpic", "method.mass=lumped", "parallel.brick=4"];
-    for sets in [&explicit[..], &["method.position_update=published"]] {
+    let affine = [
+        "method.velocity_update=tpic",
+        "method.basis=gimp",
+        "method.gimp_edge=continued",
+        "method.stress_update=musl",
+        "method.mass=lumped",
+    ];
+    for sets in [&explicit[..], &affine, &["method.position_update=published"]] {
         let deck = read(DECKS[1], sets);
         assert_eq!(deck, Deck { notes: deck.notes.clone(), ..read(&deck::resolved(&deck), &[]) });
     }

@@ -9,6 +9,7 @@ use crate::record::context::Run;
 use crate::record::ledger::{Entry, Ledger};
 use crate::record::step::{Moment, Solved};
 use crate::system::model::Model;
+use crate::transfer::affine;
 use crate::transfer::refusal::{Cause, Halt};
 
 use super::explicit_step::advance;
@@ -26,10 +27,15 @@ pub struct Explicit<const D: usize> {
 
 impl<const D: usize> Explicit<D> {
     /// Before the first step. Collective.
-    pub fn new(run: &Run<D>) -> Self {
+    pub fn new(run: &mut Run<D>) -> Result<Self> {
+        if run.recorder.resumed().is_none() {
+            let Model { deck, grid, .. } = &run.model;
+            let begun = affine::begin(&deck.method, grid, &mut run.points);
+            run.world.fail_together(begun)?;
+        }
         let (ledger, limit) = ledger_at_start(run);
         let steps = TimeSteps::new(&run.model.deck.analysis);
-        Explicit { steps, limit, ledger, before: Snapshot::default() }
+        Ok(Explicit { steps, limit, ledger, before: Snapshot::default() })
     }
 }
 

@@ -18,6 +18,7 @@ use crate::points::Snapshot;
 use crate::record::clock::Clock;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
+use crate::transfer::affine::{self, Affine};
 use crate::transfer::mapping::{self, Pushed};
 use crate::transfer::nodal_sums::{over_points, to_points};
 use crate::transfer::refusal::Halt;
@@ -106,14 +107,21 @@ impl<'a, const D: usize> Nodes<'a, D> {
     ) -> Result<(Vec<f64>, Option<Forces<D>>)> {
         let step = self.mesh.step_points(points, &self.model.materials);
         let (deck, halo) = (&self.model.deck, &self.mesh.numbering.halo);
+        let slopes = match deck.method.affine {
+            Some(kind) => affine::slopes(kind, &self.model.grid, step),
+            None => Vec::new(),
+        };
         let (momentum, mut velocity, forces) = if deck.method.stress_update == StressUpdate::Usf {
-            let momentum = clock.time(Phase::Assemble, || self.momentum(step, &points.velocity))?;
+            let momentum =
+                clock.time(Phase::Assemble, || self.momentum(step, &points.velocity, &slopes))?;
             let velocity = self.solve(step, &momentum, None)?;
             (momentum, velocity, None)
         } else {
             let [mut momentum, mut pushed] = clock.time(Phase::Assemble, || {
                 Ok(over_points(self.world, self.mesh, |part, [momenta, forces]| {
+                    let also = part.clone();
                     mapping::add_momentum_and_force(step, part, self.external, momenta, forces);
+                    affine::add_momentum(&self.model.grid, step, also, &slopes, momenta);
                 }))
             })?;
             self.hand_on(step, &mut momentum)?;
@@ -191,6 +199,13 @@ impl<'a, const D: usize> Nodes<'a, D> {
         pushed
     }
 
+    /// L and the spread of the points from v', which has values at ghosts; none without an affine
+    /// transfer.
+    pub fn gather(&self, step: StepPoints<'_, D>, velocity: &[f64]) -> Option<Affine<D>> {
+        let kind = self.model.deck.method.affine?;
+        Some(Affine::gather(kind, &self.model.grid, step, velocity))
+    }
+
     /// Updates the stress first, with the nodal `velocity` at the step's start: dF of the points,
     /// and what they hold and lose then. Collective.
     pub fn deform_first(
@@ -204,7 +219,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let flip = self.model.deck.method.flip;
         let mut deforming = if carrier == Carrier::RemappedBack && flip < 1.0 {
             let shared = blend(flip, &points.velocity, &mapping::at_points(step, velocity));
-            self.solve(step, &self.momentum(step, &shared)?, None)?
+            self.solve(step, &self.momentum(step, &shared, &[])?, None)?
         } else {
             velocity.to_vec()
         };
@@ -219,12 +234,13 @@ impl<'a, const D: usize> Nodes<'a, D> {
     }
 
     /// dt w with w of [`crate::transfer::transport`], and with musl dt times the velocity of the updated
-    /// points. Collective.
+    /// points, `slopes` their L with an affine transfer. Collective.
     pub fn motion(
         &mut self,
         carrier: Carrier,
         step: StepPoints<'_, D>,
         new_velocity: &[[f64; D]],
+        slopes: &[Square<D>],
         velocity: &[f64],
         acceleration: &[f64],
     ) -> Result<Motion> {
@@ -233,7 +249,8 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let mut moving = velocity.to_vec();
         let mut again = None;
         if carrier.needs_solve() || musl {
-            let solved = self.solve(step, &self.momentum(step, new_velocity)?, Some(velocity))?;
+            let solved =
+                self.solve(step, &self.momentum(step, new_velocity, slopes)?, Some(velocity))?;
             if carrier.needs_solve() {
                 moving.clone_from(&solved);
             }
@@ -251,10 +268,17 @@ impl<'a, const D: usize> Nodes<'a, D> {
         Ok(Motion { moved: over_step(moving), again: again.map(over_step) })
     }
 
-    /// Σ_p m S^T v at the owned nodes. Collective.
-    fn momentum(&self, step: StepPoints<'_, D>, velocity: &[[f64; D]]) -> Result<Vec<[f64; D]>> {
+    /// Σ_p m S^T v at the owned nodes, with the affine share of `slopes` if there are any.
+    /// Collective.
+    fn momentum(
+        &self,
+        step: StepPoints<'_, D>,
+        velocity: &[[f64; D]],
+        slopes: &[Square<D>],
+    ) -> Result<Vec<[f64; D]>> {
         let [mut momentum] = over_points(self.world, self.mesh, |part, [momenta]| {
-            mapping::add_momentum(step, part, velocity, momenta);
+            mapping::add_momentum(step, part.clone(), velocity, momenta);
+            affine::add_momentum(&self.model.grid, step, part, slopes, momenta);
         });
         self.hand_on(step, &mut momentum)?;
         Ok(momentum)
@@ -317,7 +341,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let mut term = velocity;
         for _ in 1..order {
             let back = mapping::at_points(step, &term);
-            let momentum = self.momentum(step, &back)?;
+            let momentum = self.momentum(step, &back, &[])?;
             if !self.taken.is_empty() {
                 // The next term is this one less what is mapped back, so that its momentum over all
                 // nodes is what the held ones keep of it.

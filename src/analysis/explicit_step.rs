@@ -22,6 +22,7 @@ use crate::record::reactions::{at_held, reactions};
 use crate::record::step::{Solved, grid_side};
 use crate::system::model::Model;
 use crate::system::step_system::{Coupling, Discretisation};
+use crate::transfer::affine::Affine;
 use crate::transfer::mapping::{self, Pushed};
 use crate::transfer::refusal::Halt;
 use crate::transfer::transport::{self, Carrier};
@@ -86,8 +87,10 @@ pub(crate) fn advance<const D: usize>(
     let step = mesh.step_points(points, &model.materials);
     let Pushed { rate, velocity: new_velocity } =
         clock.time(Phase::Update, || Ok(nodes.push(step, &mut velocity, &mut acceleration)))?;
+    let affine = clock.time(Phase::Update, || Ok(nodes.gather(step, &velocity)))?;
+    let slopes = affine.as_ref().map_or(&[][..], |affine| &affine.velocity_gradient);
     let Motion { moved, again } =
-        nodes.motion(carrier, step, &new_velocity, &velocity, &acceleration)?;
+        nodes.motion(carrier, step, &new_velocity, slopes, &velocity, &acceleration)?;
     let displacement: Vec<f64> = velocity.iter().map(|v| v * dt).collect();
     let deforming = again.as_ref().unwrap_or(&displacement);
     let (deformation, energies) = first.unzip();
@@ -119,6 +122,10 @@ pub(crate) fn advance<const D: usize>(
         update::move_points(&made.displacement, points, Some(before));
         before.velocity.replace(&mut points.velocity, new_velocity);
         before.acceleration.replace(&mut points.acceleration, rate);
+        if let Some(Affine { velocity_gradient, spread }) = affine {
+            before.velocity_gradient.replace(&mut points.velocity_gradient, velocity_gradient);
+            before.spread.replace(&mut points.spread, spread);
+        }
         Ok((energies, overgrown))
     })?;
 

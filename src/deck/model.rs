@@ -175,9 +175,20 @@ pub struct Method {
     pub flip: f64,
     /// `velocity_update = "xpic"` with `xpic_order = m`; `None` otherwise.
     pub xpic: Option<usize>,
+    /// `velocity_update = "apic"` or `"tpic"`; `None` otherwise.
+    pub affine: Option<AffineTransfer>,
     /// A node whose summed basis weight is below this fraction of the largest one is held at
     /// zero and left out of the residual (default 1e-8 without Ghost stiffness, 0 with it).
     pub drop_below: f64,
+}
+
+/// Which of the two a point keeps while it moves: see [`crate::transfer::affine`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AffineTransfer {
+    /// Its affine moment: the angular momentum.
+    Apic,
+    /// Its velocity gradient: a rigid rotation.
+    Tpic,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

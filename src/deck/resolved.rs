@@ -143,11 +143,12 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     w.line("method", "mass", quote(m.mass.name()));
     w.line("method", "stress_update", quote(m.stress_update.name()));
     w.line("method", "position_update", quote(m.position_update.name()));
-    let velocity = match (m.xpic, m.flip) {
-        (Some(_), _) => quote("xpic"),
-        (None, 1.0) => quote("flip"),
-        (None, 0.0) => quote("pic"),
-        (None, share) => number(share),
+    let velocity = match (m.xpic, m.affine, m.flip) {
+        (Some(_), ..) => quote("xpic"),
+        (None, Some(affine), _) => quote(affine.name()),
+        (None, None, 1.0) => quote("flip"),
+        (None, None, 0.0) => quote("pic"),
+        (None, None, share) => number(share),
     };
     w.line("method", "velocity_update", velocity);
     w.optional("method", "xpic_order", m.xpic.map(|order| order.to_string()));

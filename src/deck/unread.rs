@@ -41,9 +41,10 @@ fn word(deck: &Deck, choice: &str) -> Option<&'static str> {
         "analysis.on_failure" => deck.analysis.on_failure.name(),
         "method.basis" => deck.method.basis.name(),
         "method.mass" => deck.method.mass.name(),
-        "method.velocity_update" => match deck.method.xpic {
-            Some(_) => "xpic",
-            None => "flip",
+        "method.velocity_update" => match (deck.method.xpic, deck.method.affine) {
+            (Some(_), _) => "xpic",
+            (None, Some(affine)) => affine.name(),
+            (None, None) => "flip",
         },
         "grid.type" => match deck.grid {
             super::model::Grid::Lattice(_) => "lattice",

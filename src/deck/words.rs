@@ -1,9 +1,9 @@
 //! The deck's own words for the enumerations of the model.
 
 use super::model::{
-    AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
-    Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate,
-    Tangent, VerifyNorm,
+    AffineTransfer, AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame,
+    GhostScaling, GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume,
+    PositionUpdate, StressUpdate, Tangent, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -50,6 +50,7 @@ words! {
     OnFailure { "stop" => Stop, "cut" => Cut }
     InvertedIterates { "reject" => Reject, "allow" => Allow }
     Tangent { "auto" => Auto, "unsymmetric" => Unsymmetric }
+    AffineTransfer { "apic" => Apic, "tpic" => Tpic }
     Basis { "mpm" => Mpm, "gimp" => Gimp, "cpdi1" => Cpdi1, "cpdi2" => Cpdi2 }
     DomainUpdate {
         "none" => None,

@@ -30,7 +30,7 @@ use gather::{Gather, Moves};
 use nalgebra::Matrix3;
 pub use named::Named;
 
-use crate::deck::model::Basis;
+use crate::deck::model::{Basis, Method};
 use crate::grid::lattice::CORNER_SIGNS;
 use crate::tensor::Spectrum;
 use crate::tensor::spectral::ln_1p;
@@ -54,6 +54,8 @@ macro_rules! point_fields {
             pub state: Named,
             /// Parameters of the body's material where they vary in space.
             pub parameters: Named,
+            /// `velocity_gradient` and `spread` are carried: an affine transfer.
+            pub affine: bool,
         }
 
         impl<const D: usize> Points<D> {
@@ -196,6 +198,10 @@ point_fields! {
     velocity: [f64; D], D;
     /// a, m/s2 (implicit dynamics)
     acceleration: [f64; D], D;
+    /// L of an affine transfer, 1/s: see [`crate::transfer::affine`]; none without one
+    velocity_gradient: [[f64; D]; D], D * D;
+    /// Σ S (x_i - x_p)^2 along each axis when L was taken from the grid, m2; none without L
+    spread: [f64; D], D;
     /// F at the end of the last finished step
     deformation_gradient: Matrix3<f64>, 9;
     /// b_e - 1, b_e the elastic left Cauchy-Green strain at the end of the last finished step: apart
@@ -227,6 +233,11 @@ impl<const D: usize> Points<D> {
         Points { cornerless, ..Points::default() }
     }
 
+    /// No points yet, that carry what `method` reads.
+    pub fn of_method(method: &Method) -> Self {
+        Points { affine: method.affine.is_some(), ..Self::of_basis(method.basis) }
+    }
+
     /// Forgets what `basis` does not read.
     pub fn shed(&mut self, basis: Basis) {
         self.cornerless = Self::of_basis(basis).cornerless;
@@ -236,7 +247,12 @@ impl<const D: usize> Points<D> {
     }
 
     fn carries(&self, field: &str) -> bool {
-        !(self.cornerless && field == "corners")
+        !(self.cornerless && field == "corners" || !self.affine && Self::of_affine(field))
+    }
+
+    /// Whether only an affine transfer has this field.
+    pub fn of_affine(field: &str) -> bool {
+        matches!(field, "velocity_gradient" | "spread")
     }
 
     pub fn len(&self) -> usize {
@@ -275,6 +291,10 @@ impl<const D: usize> Points<D> {
         self.mass.push(density * volume);
         self.velocity.push([0.0; D]);
         self.acceleration.push([0.0; D]);
+        if self.affine {
+            self.velocity_gradient.push([[0.0; D]; D]);
+            self.spread.push([0.0; D]);
+        }
         self.deformation_gradient.push(Matrix3::identity());
         self.elastic_excess.push(Matrix3::zeros());
         self.kirchhoff_stress.push(Matrix3::zeros());
@@ -327,7 +347,7 @@ impl<const D: usize> Words for [f64; D] {
     }
 }
 
-impl<const D: usize> Words for [[f64; D]; 8] {
+impl<const D: usize, const N: usize> Words for [[f64; D]; N] {
     fn write_words(&self, out: &mut Vec<f64>) {
         for row in self {
             out.extend_from_slice(row);

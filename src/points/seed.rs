@@ -19,7 +19,7 @@ pub fn seed<const D: usize>(
     grid: &Grid<D>,
     share: Share,
 ) -> Result<(Points<D>, Vec<u64>)> {
-    let mut points = Points::of_basis(deck.method.basis);
+    let mut points = Points::of_method(&deck.method);
     let (mut first_id, mut first_ids) = (0u64, Vec::with_capacity(deck.bodies.len()));
     for (index, body) in deck.bodies.iter().enumerate() {
         let made = points.len();
@@ -298,7 +298,29 @@ fn set_velocity<const D: usize>(points: &mut Points<D>, from: usize, body: &Body
         for (v, expression) in points.velocity[p].iter_mut().zip(&body.velocity) {
             *v = expression.value(&scope);
         }
+        if points.affine {
+            points.velocity_gradient[p] = mean_gradient(body, &scope, &points.half_length[p]);
+        }
     }
+}
+
+/// Mean of ∂v_i/∂x_j over the inner half of a point's domain, 1/s: exact for a velocity of second
+/// degree, and bounded for one that jumps from domain to domain.
+fn mean_gradient<const D: usize>(body: &Body, at: &Scope, half: &[f64; D]) -> [[f64; D]; D] {
+    let mut gradient = [[0.0; D]; D];
+    for j in 0..D {
+        let side = |sign: f64, i: usize| {
+            let mut scope = *at;
+            scope.initial[j] += 0.5 * sign * half[j];
+            scope.current = scope.initial;
+            (scope.initial[j], body.velocity[i].value(&scope))
+        };
+        for (i, row) in gradient.iter_mut().enumerate() {
+            let ((low, before), (high, after)) = (side(-1.0, i), side(1.0, i));
+            row[j] = (after - before) / (high - low);
+        }
+    }
+    gradient
 }
 
 /// Lowest cell and cells per axis of the part of the lattice that the bounds cover.

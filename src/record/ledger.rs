@@ -7,6 +7,7 @@ use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::points::Points;
 
+use crate::transfer::affine;
 use crate::transfer::update::PointEnergies;
 
 /// Energy may exceed what was there and what work brought in by this share of their sum; the
@@ -36,7 +37,8 @@ pub struct Entry {
     /// GIMP domains that had grown far beyond what their points are stretched by.
     pub overgrown: f64,
     pub momentum: [f64; 3],
-    /// About the origin.
+    /// About the origin: of the points' velocities, and of their velocity gradients with an affine
+    /// transfer.
     pub angular_momentum: [f64; 3],
 }
 
@@ -72,6 +74,13 @@ impl Entry {
             if D == 3 {
                 angular[0] += x[1] * carried[2] - x[2] * carried[1];
                 angular[1] += x[2] * carried[0] - x[0] * carried[2];
+            }
+            if points.affine {
+                kinetic += mass * affine::kinetic_energy(points, p);
+                let moment = affine::angular_momentum(points, p);
+                for (sum, m) in angular.iter_mut().zip(moment) {
+                    *sum += mass * m;
+                }
             }
         }
         let StepSums { energies, ghost, work, driven, overgrown } = sums;

@@ -275,8 +275,8 @@ impl Start<'_> {
                 time_loop::run(&mut run, &mut analysis)
             }
             AnalysisType::Explicit => {
-                let mut analysis = Explicit::new(&run);
-                time_loop::run(&mut run, &mut analysis)
+                let begun = Explicit::new(&mut run);
+                begun.and_then(|mut analysis| time_loop::run(&mut run, &mut analysis))
             }
             AnalysisType::Conditioning => conditioning::run(&mut run),
             // Runs without a grid: see [`element_run`].

@@ -7,6 +7,7 @@ mod common;
 #[path = "../common/program.rs"]
 mod program;
 
+mod affine;
 mod blocks;
 mod conditioning;
 mod conservation;

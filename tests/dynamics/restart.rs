@@ -60,6 +60,17 @@ fn explicit_with_the_lumped_mass_and_plasticity() {
     every_number_of_ranks_goes_on(&deck, &[2], 1e-10);
 }
 
+/// The velocity gradients of the points are part of the state.
+#[test]
+fn explicit_with_an_affine_transfer() {
+    let deck = contact(STEPS)
+        .set("method.gimp_edge=\"continued\"")
+        .set("method.stress_update=\"musl\"")
+        .set("method.mass=\"lumped\"")
+        .set("method.velocity_update=\"apic\"");
+    every_number_of_ranks_goes_on(&deck, &RANKS, 1e-10);
+}
+
 /// The domains of this basis are part of the state.
 #[test]
 fn explicit_with_cpdi2() {

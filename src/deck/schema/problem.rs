@@ -132,8 +132,8 @@ pub const SECTIONS: &[Section] = &[
             key("position_update", Choice(PositionUpdate::NAMES), Default("\"momentum\""),
                 "What moves the points of an explicit step with the consistent mass: the velocity that keeps the angular momentum, or the updated nodal velocity (published: Ghost eq. 9).")
                 .read_by(&[EXPLICIT, only("method.mass", &["consistent"])]),
-            key("velocity_update", Special("\"flip\", \"pic\", \"xpic\", or a number from 0 (pic) to 1 (flip)"),
-                Default("\"flip\""), "How points take their velocity from the grid, in explicit and implicit dynamics; xpic is explicit.")
+            key("velocity_update", Special("\"flip\", \"pic\", \"xpic\", \"apic\", \"tpic\", or a number from 0 (pic) to 1 (flip)"),
+                Default("\"flip\""), "How points take their velocity from the grid, in explicit and implicit dynamics; xpic, apic and tpic are explicit and take the lumped mass. With apic and tpic points carry a velocity gradient beside their velocity: apic keeps the angular momentum to round-off, tpic to the change of the gimp functions along the way. Both need basis gimp with gimp_edge continued, and musl or usl.")
                 .read_by(&[DYNAMIC]),
             key("xpic_order", Count, Optional("2; only with velocity_update = \"xpic\""),
                 "Order m of XPIC(m).").range(at_least(1.0))

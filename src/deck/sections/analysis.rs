@@ -1,6 +1,8 @@
 //! `[analysis]`, `[method]`, `[conditioning]`.
 
-use crate::deck::model::{Analysis, AnalysisType, Basis, Locking, Mass, Method};
+use crate::deck::model::{
+    AffineTransfer, Analysis, AnalysisType, Basis, GimpEdge, Locking, Mass, Method, StressUpdate,
+};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::between;
@@ -119,13 +121,18 @@ pub fn method(
     let velocity = velocity_update(table);
     let order = table.count_if("xpic_order");
     let drop_below = table.number_if("drop_below");
-    let (flip, xpic) = velocity?;
+    let VelocityUpdate { flip, xpic, affine } = velocity?;
     let order = order?;
-    if xpic && kind.is_some_and(|kind| kind != AnalysisType::Explicit) {
+    let explicit_only = if xpic { Some("xpic") } else { affine.map(AffineTransfer::name) };
+    if let Some(name) = explicit_only
+        && kind.is_some_and(|kind| kind != AnalysisType::Explicit)
+    {
         return Err(table.problem(
             "velocity_update",
-            "\"xpic\" is for analysis.type = \"explicit\"; implicit dynamics reads \"flip\", \"pic\" or \
-             a number",
+            format!(
+                "\"{name}\" is for analysis.type = \"explicit\"; implicit dynamics reads \"flip\", \
+                 \"pic\" or a number"
+            ),
         ));
     }
     let stiffened = ghost.is_some_and(|ghost| ghost.stiffens(kind));
@@ -137,8 +144,25 @@ pub fn method(
              mass = \"lumped\"",
         ));
     }
-    let mass = if xpic { Mass::Lumped } else { mass };
+    if let Some(affine) = affine
+        && mass == Mass::Consistent
+        && table.given("mass")
+    {
+        return Err(table.problem(
+            "mass",
+            format!(
+                "velocity_update = \"{}\" is derived for mass = \"lumped\"; with mass = \
+                 \"consistent\", \"flip\" keeps the angular momentum as it is",
+                affine.name()
+            ),
+        ));
+    }
+    let mass = if xpic || affine.is_some() { Mass::Lumped } else { mass };
     let (basis, point_volume, locking) = (basis?, point_volume?, locking?);
+    let (gimp_edge, stress_update) = (gimp_edge?, stress_update?);
+    if let Some(affine) = affine {
+        allows_affine(table, affine, basis, gimp_edge, stress_update)?;
+    }
     if locking == Locking::FBar && !matches!(basis, Basis::Mpm | Basis::Gimp) {
         return Err(table.problem(
             "locking",
@@ -154,35 +178,85 @@ pub fn method(
     Ok(Method {
         basis,
         domain_update: domain_update?,
-        gimp_edge: gimp_edge?,
+        gimp_edge,
         point_volume,
         locking,
         frame: frame?,
         mass,
-        stress_update: stress_update?,
+        stress_update,
         position_update: position_update?,
         flip,
         xpic: xpic.then(|| order.unwrap_or(2)),
+        affine,
         drop_below: drop_below?.unwrap_or(if keeps_all { 0.0 } else { 1e-8 }),
     })
 }
 
-/// FLIP share, and whether it is XPIC.
-fn velocity_update(table: &Table<'_>) -> Got<(f64, bool)> {
-    let Some(node) = table.node("velocity_update") else { return Ok((1.0, false)) };
-    match &node.value {
-        Value::String(word) => match word.as_str() {
-            "flip" => Ok((1.0, false)),
-            "pic" => Ok((0.0, false)),
-            "xpic" => Ok((0.0, true)),
-            _ => Err(table.unknown_word(
-                "velocity_update",
-                word,
-                &["flip", "pic", "xpic"],
-                &node.origin,
-            )),
-        },
-        _ => Ok((table.number_from("velocity_update", node, between(0.0, 1.0))?, false)),
+/// What `velocity_update` stands for.
+struct VelocityUpdate {
+    /// FLIP share.
+    flip: f64,
+    xpic: bool,
+    affine: Option<AffineTransfer>,
+}
+
+fn velocity_update(table: &Table<'_>) -> Got<VelocityUpdate> {
+    let share = |flip| VelocityUpdate { flip, xpic: false, affine: None };
+    let Some(node) = table.node("velocity_update") else { return Ok(share(1.0)) };
+    let Value::String(word) = &node.value else {
+        return Ok(share(table.number_from("velocity_update", node, between(0.0, 1.0))?));
+    };
+    let affine = |affine| VelocityUpdate { affine: Some(affine), ..share(0.0) };
+    match word.as_str() {
+        "flip" => Ok(share(1.0)),
+        "pic" => Ok(share(0.0)),
+        "xpic" => Ok(VelocityUpdate { xpic: true, ..share(0.0) }),
+        "apic" => Ok(affine(AffineTransfer::Apic)),
+        "tpic" => Ok(affine(AffineTransfer::Tpic)),
+        _ => Err(table.unknown_word(
+            "velocity_update",
+            word,
+            &["flip", "pic", "xpic", "apic", "tpic"],
+            &node.origin,
+        )),
+    }
+}
+
+/// The affine transfers need functions that give linear fields back, and forces without a moment
+/// about the places of the nodes; see [`crate::transfer::affine`].
+fn allows_affine(
+    table: &Table<'_>,
+    affine: AffineTransfer,
+    basis: Basis,
+    edge: GimpEdge,
+    update: StressUpdate,
+) -> Got<()> {
+    let name = affine.name();
+    if update == StressUpdate::Usf {
+        return Err(table.problem(
+            "stress_update",
+            format!(
+                "velocity_update = \"{name}\" keeps no angular momentum where the stress is updated \
+                 first; use \"musl\" or \"usl\""
+            ),
+        ));
+    }
+    let problem = |key: &str, text: &str| {
+        Err(table.problem(key, format!("velocity_update = \"{name}\" {text}")))
+    };
+    match basis {
+        Basis::Cpdi1 | Basis::Cpdi2 => {
+            problem("basis", "is not derived for CPDI domains; use basis = \"gimp\"")
+        }
+        Basis::Mpm => problem(
+            "basis",
+            "divides by the spread of a point's weights, which with basis = \"mpm\" is zero on the \
+             faces of cells; use basis = \"gimp\"",
+        ),
+        Basis::Gimp if edge == GimpEdge::Published => {
+            problem("gimp_edge", "needs functions that sum to one; use \"continued\"")
+        }
+        Basis::Gimp => Ok(()),
     }
 }
 

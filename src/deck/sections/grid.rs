@@ -198,7 +198,13 @@ pub fn check_basis(table: &Table<'_>, grid: &Grid, method: &Method) -> Got<()> {
         return Err(table.problem_with_help(
             "type",
             "method.basis = \"gimp\" needs type = \"lattice\"",
-            "on a mesh use basis = \"mpm\", \"cpdi1\" or \"cpdi2\"",
+            match method.affine {
+                Some(_) => {
+                    "on a mesh basis = \"mpm\" with mass = \"consistent\" and velocity_update = \
+                     \"flip\" keeps the angular momentum"
+                }
+                None => "on a mesh use basis = \"mpm\", \"cpdi1\" or \"cpdi2\"",
+            },
         ));
     }
     Ok(())

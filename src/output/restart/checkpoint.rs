@@ -96,6 +96,9 @@ impl<const D: usize> Checkpoint<'_, D> {
         let body: Vec<u64> = points.body.iter().map(|&body| u64::from(body)).collect();
         out.rows("points.body", 1, &body)?;
         for (name, words) in Points::<D>::field_words() {
+            if !points.affine && Points::<D>::of_affine(name) {
+                continue;
+            }
             let mut values = Vec::with_capacity(points.len() * words);
             for p in 0..points.len() {
                 points.field_of(name, p, &mut values);
@@ -317,8 +320,14 @@ impl Reader<'_> {
         let id = self.rows::<u64>("points.id", first, rows)?;
         let body = self.rows::<u64>("points.body", first, rows)?;
         let mut fields = Vec::new();
-        for (name, words) in Points::<D>::field_words() {
-            let mut name = dataset_of(name);
+        let mut affine = true;
+        for (field, words) in Points::<D>::field_words() {
+            let mut name = dataset_of(field);
+            if Points::<D>::of_affine(field) && !self.file.has(&name) {
+                affine = false;
+                fields.push((words, vec![0.0; words * rows]));
+                continue;
+            }
             // Format 1 stored b_e itself.
             let whole = dataset_of("elastic_left_cauchy_green");
             let of_whole = name == dataset_of("elastic_excess") && self.file.has(&whole);
@@ -339,7 +348,7 @@ impl Reader<'_> {
             }
             fields.push((words, values));
         }
-        let mut points = Points::default();
+        let mut points = Points { affine, ..Points::default() };
         let mut record = Vec::with_capacity(Points::<D>::base_words());
         for p in 0..rows {
             record.clear();
