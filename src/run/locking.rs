@@ -114,7 +114,7 @@ mod tests {
             let sand = [1e7, 0.3, 30.0, dilation, 1e4, infinite];
             Material::MohrCoulomb(<MohrCoulomb as Model>::new(&sand))
         };
-        let metal = <VonMises as Model>::new(&[1e7, 0.3, 2e4, 0.0, 0.0]);
+        let metal = <VonMises as Model>::new(&[1e7, 0.3, 2e4, 0.0, 0.0, 0.0, 0.0, 0.0]);
         let clay = <Tresca as Model>::new(&[1e7, 0.3, 1e4]);
         let found = [Material::VonMises(metal), Material::Tresca(clay), sand(0.0), sand(10.0)];
         let plastic = Some(Cause::Plastic);
