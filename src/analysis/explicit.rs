@@ -132,6 +132,12 @@ fn gaining<const D: usize>(model: &Model<D>) -> String {
         (Mass::Lumped, Basis::Gimp, DomainUpdate::Corners) => {
             "GIMP domains that follow nodes of little mass (domain_update = \"stretch\" does not)"
         }
+        // Measured: docs/evidence/exactness.md, under "Not kept".
+        (Mass::Consistent, Basis::Gimp, update) if update != DomainUpdate::None => {
+            "the time step, which with the consistent mass must be smaller where GIMP domains are \
+             stretched over more than a cell (half the step, domain_update = \"none\" or mass = \
+             \"lumped\" helps; a FLIP share below 1 does not)"
+        }
         (Mass::Consistent, ..) => {
             "points that cross cells under large deformation with the FLIP share of velocity_update \
              (a number below 1 damps it), or the time step"
