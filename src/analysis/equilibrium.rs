@@ -414,6 +414,10 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let (cell, count) = (self.grid.cell_size(), (self.numbering.total * D) as f64);
         let largest = self.diagonal_largest * cell * count.sqrt() + self.actions_norm;
         let moves = self.world.max(self.displacement.iter().fold(0.0, |m, u| u.abs().max(m)));
+        // The iterate of a singular system may be of any size, and its terms with it.
+        if moves > FARTHEST * cell {
+            return Ok(false);
+        }
         if !round_off::explains(largest * (1.0 + moves / cell), self.residual_norm) {
             return Ok(false);
         }
@@ -583,6 +587,9 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         })
     }
 }
+
+/// Cells that a node may move in a step for the residual to be judged by the size of its terms.
+const FARTHEST: f64 = 1e3;
 
 /// Mean and largest size of the free diagonal entries over all ranks; 1 where there are none.
 /// Collective.
