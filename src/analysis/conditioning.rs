@@ -59,7 +59,7 @@ pub fn run<const D: usize>(run: &mut Run<D>) -> Result<Ending> {
         recorder.steps_completed = number;
         let moment = if number == steps { Moment::End } else { Moment::Step };
         clock.time(Phase::Output, || {
-            recorder.step(world, &row, false, moment)?;
+            recorder.step(world, points, &row, false, moment)?;
             if recorder.wants_frame(number, span.factor_end, number == steps) {
                 recorder.frame(world, number, span.factor_end, points)?;
             }

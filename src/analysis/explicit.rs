@@ -69,7 +69,7 @@ impl<const D: usize> Analysis<D> for Explicit<D> {
         if let Err(gain) = self.ledger.book(&entry, row) {
             // The row shows what happened.
             row.wall_seconds = run.clock.elapsed();
-            run.recorder.step(run.world, row, false, Moment::End)?;
+            run.recorder.step(run.world, &run.points, row, false, Moment::End)?;
             let (limit, _) = stability_limit(run.world, &run.model, &run.points);
             let remedy = format!(
                 "the time step {:.3e} s is too large (stability limit of full cells {limit:.3e} \

@@ -75,7 +75,7 @@ impl<const D: usize> Dynamics<D> {
         if let Err(gain) = self.ledger.book(&entry, row) {
             // The row shows what happened.
             row.wall_seconds = run.clock.elapsed();
-            run.recorder.step(run.world, row, true, Moment::End)?;
+            run.recorder.step(run.world, &run.points, row, true, Moment::End)?;
             let remedy =
                 "smaller steps, or analysis.hht_alpha = -0.1, damp what they excite".to_string();
             return Err(Halt::Unstable { gain, remedy });

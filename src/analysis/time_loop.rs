@@ -214,7 +214,7 @@ fn finish<const D: usize>(
     row.moved_points = run.settle()?;
     let Run { world, model, points, recorder, clock } = run;
     row.wall_seconds = clock.elapsed();
-    clock.time(Phase::Output, || recorder.step(world, &row, manner.newton, moment))?;
+    clock.time(Phase::Output, || recorder.step(world, points, &row, manner.newton, moment))?;
     let state = analysis.state();
     let stop =
         clock.time(Phase::Output, || recorder.end_step(world, model, points, moment, state))?;

@@ -28,6 +28,7 @@ pub struct Deck {
     pub boundaries: Vec<Boundary>,
     pub loads: Vec<Load>,
     pub verify: Vec<Verify>,
+    pub probes: Vec<Probe>,
     pub output: Output,
     pub parallel: Parallel,
     /// `[conditioning] displacement`, m: total rigid motion over the analysis.
@@ -530,6 +531,28 @@ pub struct Verify {
     pub exact: Vec<Expression>,
     pub norm: VerifyNorm,
     pub scale: f64,
+}
+
+/// `[[probe]]`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    pub name: String,
+    pub spot: Spot,
+    /// Fields or components, as written: `displacement`, `stress.yy`.
+    pub fields: Vec<String>,
+}
+
+/// What a probe follows.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Spot {
+    /// The point, of all or of one body, that is nearest to a place (m) at the start.
+    Near {
+        place: Vec<f64>,
+        body: Option<usize>,
+    },
+    Id(u64),
+    /// The mean over a body.
+    Mean(usize),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

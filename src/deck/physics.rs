@@ -17,6 +17,7 @@ pub fn physics(deck: &Deck) -> String {
     let mut deck = deck.clone();
     deck.title.clear();
     deck.verify.clear();
+    deck.probes.clear();
     deck.petsc.clear();
     deck.output = Output {
         every: Every::Steps(1),

@@ -1,7 +1,7 @@
 //! The schema as documentation: `docs/guide/deck.md` is this text.
 
 use super::expression;
-use super::fields::FIELDS;
+use super::fields::{FIELDS, Field};
 use super::schema::{self, Kind, Need, Reader, Section};
 use crate::material::CATALOGUE;
 
@@ -58,18 +58,18 @@ pub fn markdown() -> String {
 fn fields() -> String {
     let mut out = String::from(
         "## Fields\n\nPoint fields for `output.fields`; `verify.field` takes scalars, components \
-         and whole vectors.\n\n| field | components |\n|---|---|\n",
+         and whole vectors.\n\n| field | components | unit | meaning |\n|---|---|---|---|\n",
     );
-    for (name, rank) in FIELDS {
+    for Field { name, rank, unit, doc } in FIELDS {
         let components: Vec<String> =
             rank.components(3).iter().map(|c| format!("`.{c}`")).collect();
         let components = components.join(" ");
-        out.push_str(&format!("| `{name}` | {components} |\n"));
+        out.push_str(&format!("| `{name}` | {components} | {unit} | {doc} |\n"));
     }
     for entry in CATALOGUE.iter().filter(|entry| !entry.state.is_empty()) {
         for variable in entry.state {
             let (name, unit) = (variable.name, variable.unit);
-            out.push_str(&format!("| `{name}` | state of `{}`, {unit} |\n", entry.name));
+            out.push_str(&format!("| `{name}` | | {unit} | State of `{}` |\n", entry.name));
         }
     }
     out

@@ -3,7 +3,7 @@
 use super::expression::Expression;
 use super::model::{
     BodySource, Deck, ElementTest, Every, Grid, Load, Material, MeshMotion, MeshSource, Place,
-    Seeding,
+    Seeding, Spot,
 };
 use super::schema::{self, AXES, SIDES};
 use super::shape::{Form, Shape};
@@ -407,6 +407,20 @@ fn results(w: &mut Writer<'_>, deck: &Deck) {
         w.line("verify", "exact", exact);
         w.line("verify", "norm", quote(verify.norm.name()));
         w.line("verify", "scale", number(verify.scale));
+    }
+    for probe in &deck.probes {
+        w.table("[[probe]]");
+        w.line("probe", "name", quote(&probe.name));
+        let body = |body: &usize| quote(&deck.bodies[*body].name);
+        match &probe.spot {
+            Spot::Near { place, body: of } => {
+                w.line("probe", "near", vector(place));
+                w.optional("probe", "body", of.as_ref().map(body));
+            }
+            Spot::Id(id) => w.line("probe", "id", id.to_string()),
+            Spot::Mean(of) => w.line("probe", "body", body(of)),
+        }
+        w.line("probe", "fields", array(probe.fields.iter().map(|field| quote(field))));
     }
     w.table("[output]");
     let interval = |every: Every| match every {

@@ -8,7 +8,7 @@ use mpi::topology::SimpleCommunicator;
 use super::agreement::on_root;
 use super::names::names_in;
 pub use super::names::{
-    DECK, ELEMENT, HISTORY, LOG, PASSED_OVER, RESIDUALS, RESOLVED_DECK, SUMMARY, SUPERSEDED,
+    DECK, ELEMENT, HISTORY, LOG, PASSED_OVER, PROBES, RESIDUALS, RESOLVED_DECK, SUMMARY, SUPERSEDED,
 };
 use super::ownership::{self, RESOLVED_HEAD, holds, look};
 use super::whole_file::{PARTIAL, cannot_read, cannot_write, write_whole};

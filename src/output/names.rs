@@ -11,6 +11,8 @@ pub const SUMMARY: &str = "summary.json";
 pub const HISTORY: &str = "history.csv";
 /// Rows of an element test.
 pub const ELEMENT: &str = "element.csv";
+/// Rows of `[[probe]]`.
+pub const PROBES: &str = "probes.csv";
 pub const RESIDUALS: &str = "residuals.csv";
 pub const LOG: &str = "log.txt";
 pub const DECK: &str = "input.toml";
@@ -27,9 +29,10 @@ pub const SERIES_HEAD: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
      <Grid Name=\"series\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [&str; 10] = [
+const NAMES: [&str; 11] = [
     SUMMARY,
     HISTORY,
+    PROBES,
     RESIDUALS,
     ELEMENT,
     LOG,

@@ -10,14 +10,14 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::names::{
-    DECK, ELEMENT, HISTORY, LOG, RESIDUALS, RESOLVED_DECK, SERIES_HEAD, SUMMARY, names_in,
+    DECK, ELEMENT, HISTORY, LOG, PROBES, RESIDUALS, RESOLVED_DECK, SERIES_HEAD, SUMMARY, names_in,
 };
 use super::restart::seal;
 use crate::error::Result;
 
 /// First line of [`RESOLVED_DECK`].
 pub const RESOLVED_HEAD: &str = "# The deck with every default, written by mpm-par.\n";
-/// Beginning of the two tables.
+/// Beginning of the tables.
 const TABLE_HEAD: &str = "step [-],";
 /// Beginning of the log: the banner.
 const LOG_HEAD: &str = "mpm-par ";
@@ -35,10 +35,11 @@ enum Proof {
 }
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [(&str, Proof); 10] = [
+const NAMES: [(&str, Proof); 11] = [
     (SUMMARY, Proof::Summary),
     (HISTORY, Proof::Begins(TABLE_HEAD)),
     (RESIDUALS, Proof::Begins(TABLE_HEAD)),
+    (PROBES, Proof::Begins(TABLE_HEAD)),
     (ELEMENT, Proof::Begins(TABLE_HEAD)),
     (LOG, Proof::Begins(LOG_HEAD)),
     (DECK, Proof::Company),

@@ -11,6 +11,7 @@
 //! | `diffuse.rs` | an old partition levelled by few moves |
 //! | `partition.rs` | owner of each unit, cell and node |
 //! | `migrate.rs` | points to the ranks that own their cells |
+//! | `nearest.rs` | the point nearest to a place |
 //! | `traffic.rs` | messages, bytes and reductions, counted |
 //! | `launcher.rs` | whether the launcher belongs to this MPI |
 //! | `signals.rs` | SIGTERM and SIGUSR1 as a wish of all ranks |
@@ -24,6 +25,7 @@ pub mod halo;
 pub mod launcher;
 pub mod metis;
 pub mod migrate;
+pub mod nearest;
 pub mod partition;
 pub mod signals;
 pub mod traffic;

@@ -8,6 +8,7 @@
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
+//! | watched points | `probes.rs` | |
 //! | wall time by phase | `clock.rs` | |
 //! | checkpoints and restarts | `checkpointing.rs` | |
 
@@ -15,6 +16,7 @@ pub mod checkpointing;
 pub mod clock;
 pub mod context;
 pub mod ledger;
+pub mod probes;
 pub mod reactions;
 pub mod recorder;
 pub mod step;

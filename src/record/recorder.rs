@@ -27,6 +27,7 @@ use crate::points::Points;
 
 use super::checkpointing::Checkpointer;
 use super::clock::Clock;
+use super::probes::{Followed, Probes};
 use super::step::{Moment, Solved};
 use crate::system::model::Model;
 
@@ -36,6 +37,7 @@ pub struct Recorder {
     directory: ResultsDirectory,
     history: History,
     residuals: Residuals,
+    probes: Option<Probes>,
     points: PointsSeries,
     grid: GridSeries,
     progress: Progress,
@@ -99,6 +101,8 @@ pub struct Opening {
     pub versions: BTreeMap<String, String>,
     pub checkpointer: Checkpointer,
     pub resume: Option<Resume>,
+    /// What each probe of the deck follows.
+    pub followed: Vec<Followed>,
     /// The log has a line for every step.
     pub verbose: bool,
 }
@@ -159,7 +163,8 @@ impl Recorder {
     /// The files of a results directory: fresh ones, or those of the run that is resumed, which are
     /// read and tested. Nothing is written before [`Self::open`].
     pub fn create(world: &World, deck: &Deck, opening: Opening) -> Result<Self> {
-        let Opening { directory, mut log, versions, checkpointer, resume, verbose } = opening;
+        let Opening { directory, mut log, versions, checkpointer, resume, followed, verbose } =
+            opening;
         let comm = world.comm();
         let layout = Layout {
             dimension: deck.dimension,
@@ -196,6 +201,8 @@ impl Recorder {
                 )
             }
         };
+        let state = goes_on.map(|resume| &resume.state);
+        let probes = Probes::new(world, deck, &followed, &directory, state, &mut log)?;
         let same_directory = goes_on.is_some();
         let interval = match deck.output.log {
             _ if verbose => Interval::Steps(1),
@@ -206,6 +213,7 @@ impl Recorder {
             log,
             history,
             residuals,
+            probes,
             points,
             grid,
             directory,
@@ -248,6 +256,7 @@ impl Recorder {
         self.points.cut(comm)?;
         self.grid.cut(comm)?;
         self.history.table.open(comm)?;
+        self.probes.as_mut().map_or(Ok(()), |probes| probes.table.open(comm))?;
         self.residuals.table.open(comm)
     }
 
@@ -326,6 +335,7 @@ impl Recorder {
         // A checkpoint counts on its rows: they are to outlast a power cut if it does.
         self.history.table.sync(world.comm())?;
         self.residuals.table.sync(world.comm())?;
+        self.probes.as_ref().map_or(Ok(()), |probes| probes.table.sync(world.comm()))?;
         let step = self.steps_completed;
         let path = self.checkpointer.write(world, step, model, points, &state)?;
         self.log.note(&format!("checkpoint: {}", path.display()));
@@ -349,6 +359,9 @@ impl Recorder {
             ("recorder.linear_since_row", self.since_row.linear),
         ] {
             state.set_count(name, value as u64);
+        }
+        if let Some(probes) = &self.probes {
+            probes.save(state);
         }
         state.set("recorder.last_frame", self.last_frame);
         state.set("recorder.last_row", self.last_row);
@@ -387,9 +400,10 @@ impl Recorder {
 
     /// Records one accepted step (or part of one): a row and a line, where the deck's intervals
     /// want them. A step that ends the run, for whatever reason, is a [`Moment::End`].
-    pub fn step(
+    pub fn step<const D: usize>(
         &mut self,
         world: &World,
+        points: &Points<D>,
         row: &HistoryRow,
         with_newton: bool,
         moment: Moment,
@@ -408,6 +422,9 @@ impl Recorder {
                 ..row.clone()
             };
             self.history.push(&whole, world.comm())?;
+            if let Some(probes) = &mut self.probes {
+                probes.push(world, points, &whole)?;
+            }
         }
         self.watch_boundaries(row);
         self.recorded = row.step;

@@ -1,6 +1,6 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
-use crate::deck::fields::{FIELDS, FieldRank};
+use crate::deck::fields::{self, FieldRank};
 use crate::deck::model::{Basis, Body, BodySource};
 use crate::deck::rough;
 use crate::output::terminal::report::Plan;
@@ -84,13 +84,10 @@ const BYTES_PER_STEP: f64 = 1500.0;
 
 /// A point in a frame: place, identity, body, rank, fields, and the corners of its domain.
 fn bytes_per_point<const D: usize>(deck: &crate::deck::Deck) -> f64 {
-    let numbers = |name: &String| {
-        let rank = FIELDS.iter().find(|(field, _)| field == name).map(|(_, rank)| *rank);
-        match rank {
-            Some(FieldRank::Vector) => 3,
-            Some(rank) => rank.components(3).len().max(1),
-            None => 1,
-        }
+    let numbers = |name: &String| match fields::rank(name) {
+        Some(FieldRank::Vector) => 3,
+        Some(rank) => rank.components(3).len().max(1),
+        None => 1,
     };
     let corners = if deck.method.basis == Basis::Mpm { 0 } else { 3 << D };
     let fields: usize = deck.output.fields.iter().map(numbers).sum();

@@ -34,6 +34,7 @@ use crate::output::summary::Communication;
 use crate::record::checkpointing::{self, Checkpointer, Restart};
 use crate::record::clock::Clock;
 use crate::record::context::Run;
+use crate::record::probes;
 use crate::record::recorder::{Closing, Ending, Opening, Recorder, Resume, restore_balance};
 use crate::record::verify;
 use crate::system::step_system;
@@ -229,6 +230,7 @@ impl Start<'_> {
             }
             _ => {}
         }
+        let followed = probes::find(world, &model.deck, &model.grid, &points)?;
         let plan = plan::of(world, &model, &points, &active);
         self.log.say(&report::plan(&plan));
         model.deck.notes.iter().for_each(|note| self.log.say(note));
@@ -252,7 +254,8 @@ impl Start<'_> {
         let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
         let (log, versions, into) = (self.log, self.versions, directory.clone());
         let verbose = self.arguments.voice == cli::Voice::Verbose;
-        let opening = Opening { directory: into, log, versions, checkpointer, resume, verbose };
+        let opening =
+            Opening { directory: into, log, versions, checkpointer, resume, followed, verbose };
         let mut recorder = Recorder::create(world, &model.deck, opening)?;
         // All of the earlier part is known to fit: now it may be changed.
         if let (Some((used, step)), Some(choice)) = (&earlier, &self.arguments.restart) {

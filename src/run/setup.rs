@@ -10,6 +10,7 @@ use crate::grid::{Grid, Lattice, Mesh};
 use crate::loads::{self, Found, Manufactured, traction};
 use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
+use crate::parallel::nearest::nearest_point;
 use crate::parallel::{self, Partition, World};
 use crate::points::Points;
 use crate::points::overlap;
@@ -217,21 +218,8 @@ fn find_carriers<const D: usize>(
         }
         let Load::Point { body, nearest, .. } = load else { continue };
         for place in nearest {
-            let distance = |p: usize| -> f64 {
-                let x = &points.position_initial[p];
-                x.iter().zip(place).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt()
-            };
-            let own: Vec<usize> =
-                (0..points.len()).filter(|&p| points.body[p] as usize == *body).collect();
-            let best = world.min(own.iter().map(|&p| distance(p)).fold(f64::INFINITY, f64::min));
-            let slack = 1e-9 * own.first().map_or(0.0, |&p| points.half_length_initial[p][0]);
-            let id = own
-                .iter()
-                .filter(|&&p| distance(p) <= best + slack)
-                .map(|&p| points.id[p])
-                .min()
-                .unwrap_or(u64::MAX);
-            let id = world.min_u64(id);
+            let nearest_of_all = nearest_point(world, points, Some(*body), place);
+            let (id, best) = nearest_of_all.unwrap_or((u64::MAX, f64::INFINITY));
             let found = (0..points.len()).find(|&p| points.id[p] == id);
             let far = found.and_then(|p| {
                 let half = points.half_length_initial[p].iter().copied().fold(0.0, f64::max);

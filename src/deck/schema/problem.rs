@@ -40,6 +40,8 @@ pub const SECTIONS: &[Section] = &[
                 .read_by(&[LOADED]),
             key("verify", Tables("verify"), Optional("none"), "Figures of merit.")
                 .read_by(&[ON_GRID]),
+            key("probe", Tables("probe"), Optional("none"), "Points that are watched.")
+                .read_by(&[ON_GRID]),
             key("output", Table("output"), Optional("all defaults"), "What is written, and when.")
                 .read_by(&[ON_GRID]),
             key("parallel", Table("parallel"), Optional("all defaults"), "Distribution.")
@@ -267,6 +269,36 @@ pub const RESULT_SECTIONS: &[Section] = &[
                 "Lagrangian eq. 42, its quadratic form, or the largest error.",
             ),
             key("scale", Number, Default("1.0"), "Divides the error.").range(POSITIVE),
+        ],
+    },
+    Section {
+        name: "probe",
+        header: "[[probe]]",
+        doc: "Fields of one point, or means over a body, in `probes.csv`: a row beside each of `history.csv`, a column for each component, named `NAME.field.component [unit]`. A point is followed wherever it goes. Give one of near, id and body.",
+        keys: &[
+            key("name", Text, Required, "Its name there."),
+            key(
+                "near",
+                Vector,
+                Optional("or id, body"),
+                "The point whose initial position is nearest, of all bodies or of `body`.",
+            )
+            .unit("m"),
+            key("id", Count, Optional("or near, body"), "The point with this id (field `id`)."),
+            key(
+                "body",
+                Text,
+                Optional("or near, id"),
+                "Name of a body: the mean over its points, weighted by the initial volume.",
+            ),
+            key(
+                "fields",
+                Special(
+                    "an array of fields or components, such as [\"displacement\", \"stress.yy\"]",
+                ),
+                Required,
+                "What is written: of a whole vector or tensor all components.",
+            ),
         ],
     },
     Section {

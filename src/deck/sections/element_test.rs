@@ -54,6 +54,7 @@ pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
         boundaries: Vec::new(),
         loads: Vec::new(),
         verify: Vec::new(),
+        probes: Vec::new(),
         output: basics.output?,
         parallel: basics.parallel?,
         conditioning_displacement: None,

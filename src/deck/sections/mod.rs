@@ -11,6 +11,7 @@
 //! | `shapes.rs` | body.shape |
 //! | `conditions.rs` | boundary, load |
 //! | `restraint.rs` | whether rigid motion is held |
+//! | `probes.rs` | probe |
 //! | `results.rs` | verify, output, parallel |
 //! | `petsc.rs` | petsc |
 
@@ -22,6 +23,7 @@ mod ghost;
 mod grid;
 mod materials;
 mod petsc;
+mod probes;
 mod restraint;
 mod results;
 mod shapes;
@@ -69,6 +71,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let boundaries = conditions::boundaries(&root, &world, &names);
     let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
     let verify = results::verify(&root, dimension);
+    let probes = probes::probes(&root, dimension, &names);
     if let (Ok(method), Ok(boundaries)) = (&method, &boundaries) {
         let grid_problems = root.table("grid", |table| {
             grid::check_basis(&table, &grid, method)?;
@@ -93,6 +96,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         boundaries: boundaries?,
         loads: loads?,
         verify: verify?,
+        probes: probes?,
         output: output?,
         parallel: parallel?,
         conditioning_displacement: conditioning?,

@@ -3,12 +3,17 @@
 //! Cauchy stress sigma = tau / J; pressure p = -tr(sigma)/3 (positive in compression);
 //! `von_mises` sqrt(3 J2) of the Cauchy stress; `deviatoric_radius` sqrt(2 J2) of the Kirchhoff
 //! stress, the radius that the von Mises model bounds by its yield value (Lagrangian eq. 43).
+//! Logarithmic strain ln(b)/2, b = F F^T; its principal values come from b - 1, so that small strains
+//! keep their digits. Units and meanings are those of [`crate::deck::fields`].
 
 use nalgebra::Matrix3;
 
+use crate::deck::fields::{self, FieldRank};
 use crate::error::{Error, Result};
 use crate::material::{StateVariable, state_variables};
 use crate::points::Points;
+use crate::tensor::Spectrum;
+use crate::tensor::spectral::ln_1p;
 
 /// Shape of a field's value at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,13 +27,15 @@ pub enum Quantity {
     Tensor6,
     /// Row by row: 00, 01, 02, 10, ...
     Tensor9,
+    /// Three principal values, the largest first.
+    Principal,
 }
 
 impl Quantity {
     pub fn columns(self) -> usize {
         match self {
             Quantity::Integer | Quantity::Scalar => 1,
-            Quantity::Vector => 3,
+            Quantity::Vector | Quantity::Principal => 3,
             Quantity::Tensor6 => 6,
             Quantity::Tensor9 => 9,
         }
@@ -41,16 +48,17 @@ impl Quantity {
             Quantity::Vector => &["x", "y", "z"],
             Quantity::Tensor6 => &["xx", "xy", "xz", "yy", "yz", "zz"],
             Quantity::Tensor9 => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
+            Quantity::Principal => &["1", "2", "3"],
         }
     }
 }
 
 macro_rules! point_field_table {
-    ($( $(#[$doc:meta])* $variant:ident, $name:literal, $quantity:ident, $unit:literal; )*) => {
+    ($( $variant:ident $name:literal ),* $(,)?) => {
         /// A field of the material points, named as in `output.fields`.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum PointField {
-            $( $(#[$doc])* $variant, )*
+            $( #[doc = concat!("`", $name, "` of [`FIELDS`]")] $variant, )*
             /// A state variable of a material; zero at points whose material has none of the name.
             State(StateVariable),
         }
@@ -65,58 +73,73 @@ macro_rules! point_field_table {
                     PointField::State(variable) => variable.name,
                 }
             }
-
-            pub fn quantity(self) -> Quantity {
-                match self {
-                    $( PointField::$variant => Quantity::$quantity, )*
-                    PointField::State(_) => Quantity::Scalar,
-                }
-            }
-
-            pub fn unit(self) -> &'static str {
-                match self {
-                    $( PointField::$variant => $unit, )*
-                    PointField::State(variable) => variable.unit,
-                }
-            }
         }
     };
 }
 
 point_field_table! {
-    /// u = x - X
-    Displacement, "displacement", Vector, "m";
-    Position, "position", Vector, "m";
-    PositionInitial, "position_initial", Vector, "m";
-    Velocity, "velocity", Vector, "m/s";
-    Acceleration, "acceleration", Vector, "m/s2";
-    /// Cauchy stress
-    Stress, "stress", Tensor6, "Pa";
-    KirchhoffStress, "kirchhoff_stress", Tensor6, "Pa";
-    Pressure, "pressure", Scalar, "Pa";
-    VonMises, "von_mises", Scalar, "Pa";
-    DeviatoricRadius, "deviatoric_radius", Scalar, "Pa";
-    /// Accumulated plastic strain
-    PlasticStrain, "plastic_strain", Scalar, "-";
-    Dissipation, "dissipation", Scalar, "J/m3";
-    DeformationGradient, "deformation_gradient", Tensor9, "-";
-    ElasticLeftCauchyGreen, "elastic_left_cauchy_green", Tensor6, "-";
-    /// det F
-    Jacobian, "J", Scalar, "-";
-    /// Current volume
-    Volume, "volume", Scalar, "m3";
-    Mass, "mass", Scalar, "kg";
-    HalfLength, "half_length", Vector, "m";
-    PointForce, "point_force", Vector, "N";
-    /// Stable identity
-    Id, "id", Integer, "-";
-    /// Index of the deck's body
-    Body, "body", Integer, "-";
-    /// The rank that owns the point
-    Rank, "rank", Integer, "-";
+    Displacement "displacement",
+    Position "position",
+    PositionInitial "position_initial",
+    Velocity "velocity",
+    Acceleration "acceleration",
+    Stress "stress",
+    KirchhoffStress "kirchhoff_stress",
+    PrincipalStress "principal_stress",
+    Pressure "pressure",
+    MeanStress "p",
+    Deviator "q",
+    VonMises "von_mises",
+    MobilisedFriction "mobilised_friction",
+    DeviatoricRadius "deviatoric_radius",
+    LogStrain "log_strain",
+    VolumetricStrain "volumetric_strain",
+    EquivalentStrain "equivalent_strain",
+    PlasticStrain "plastic_strain",
+    Dissipation "dissipation",
+    DeformationGradient "deformation_gradient",
+    ElasticLeftCauchyGreen "elastic_left_cauchy_green",
+    Jacobian "J",
+    Volume "volume",
+    Mass "mass",
+    HalfLength "half_length",
+    PointForce "point_force",
+    Id "id",
+    Body "body",
+    Rank "rank",
 }
 
 impl PointField {
+    pub fn quantity(self) -> Quantity {
+        let PointField::State(_) = self else {
+            return match fields::known(self.name()).rank {
+                FieldRank::Integer => Quantity::Integer,
+                FieldRank::Scalar => Quantity::Scalar,
+                FieldRank::Vector => Quantity::Vector,
+                FieldRank::Symmetric => Quantity::Tensor6,
+                FieldRank::Tensor => Quantity::Tensor9,
+                FieldRank::Principal => Quantity::Principal,
+            };
+        };
+        Quantity::Scalar
+    }
+
+    /// SI unit.
+    pub fn unit(self) -> &'static str {
+        match self {
+            PointField::State(variable) => variable.unit,
+            field => fields::known(field.name()).unit,
+        }
+    }
+
+    /// What it is, in a few words.
+    pub fn description(self) -> &'static str {
+        match self {
+            PointField::State(_) => "State variable of a material",
+            field => fields::known(field.name()).doc,
+        }
+    }
+
     pub fn from_name(name: &str) -> Option<Self> {
         let of_points = Self::ALL.iter().copied();
         let of_materials = state_variables().into_iter().map(PointField::State);
@@ -173,8 +196,15 @@ impl PointField {
             PointField::ElasticLeftCauchyGreen => {
                 append_symmetric(&(Matrix3::identity() + points.elastic_excess[p]), out);
             }
-            PointField::Pressure => out.push(-cauchy().trace() / 3.0),
-            PointField::VonMises => out.push(1.5_f64.sqrt() * deviatoric_norm(&cauchy())),
+            PointField::PrincipalStress => out.extend(descending(&cauchy())),
+            PointField::Pressure | PointField::MeanStress => out.push(-cauchy().trace() / 3.0),
+            PointField::MobilisedFriction => out.push(mobilised_friction(&cauchy())),
+            PointField::LogStrain => append_symmetric(&LogStrain::of(points, p).tensor(), out),
+            PointField::VolumetricStrain => out.push(LogStrain::of(points, p).trace()),
+            PointField::EquivalentStrain => out.push(LogStrain::of(points, p).equivalent()),
+            PointField::VonMises | PointField::Deviator => {
+                out.push(1.5_f64.sqrt() * deviatoric_norm(&cauchy()))
+            }
             PointField::DeviatoricRadius => out.push(deviatoric_norm(&points.kirchhoff_stress[p])),
             PointField::PlasticStrain => out.push(points.plastic_strain[p]),
             PointField::Dissipation => out.push(points.dissipation[p]),
@@ -221,6 +251,60 @@ fn append_symmetric(tensor: &Matrix3<f64>, out: &mut Vec<f64>) {
 /// ||s|| = sqrt(2 J2)
 fn deviatoric_norm(stress: &Matrix3<f64>) -> f64 {
     (stress - Matrix3::identity() * (stress.trace() / 3.0)).norm()
+}
+
+/// Principal values, the largest first.
+fn descending(stress: &Matrix3<f64>) -> [f64; 3] {
+    let mut values = Spectrum::of(stress).values;
+    values.sort_by(|a, b| b.total_cmp(a));
+    values
+}
+
+/// Angle of the line through the origin that touches the largest Mohr circle, degrees; 0 without
+/// stress, 90 where the circle reaches into tension.
+fn mobilised_friction(stress: &Matrix3<f64>) -> f64 {
+    let [first, _, third] = descending(stress);
+    let (radius, centre) = (first - third, -first - third);
+    match radius {
+        _ if radius.is_nan() => f64::NAN,
+        0.0 => 0.0,
+        _ if radius >= centre => 90.0,
+        _ => (radius / centre).asin().to_degrees(),
+    }
+}
+
+/// ln(b)/2 by principal values and axes.
+struct LogStrain {
+    values: [f64; 3],
+    axes: [[f64; 3]; 3],
+}
+
+impl LogStrain {
+    fn of<const D: usize>(points: &Points<D>, p: usize) -> Self {
+        // b - 1 = H + H^T + H H^T, H = F - 1.
+        let h = points.deformation_gradient[p] - Matrix3::identity();
+        let Spectrum { values, axes } = Spectrum::of(&(h + h.transpose() + h * h.transpose()));
+        LogStrain { values: values.map(|excess| 0.5 * ln_1p(excess)), axes }
+    }
+
+    fn trace(&self) -> f64 {
+        self.values.iter().sum()
+    }
+
+    fn tensor(&self) -> Matrix3<f64> {
+        Matrix3::from_fn(|i, j| {
+            let parts = self.values.iter().zip(&self.axes);
+            parts.map(|(value, axis)| value * axis[i] * axis[j]).sum()
+        })
+    }
+
+    /// sqrt(2/3 e:e) of the deviator e.
+    fn equivalent(&self) -> f64 {
+        let [a, b, c] = self.values;
+        // e:e is a third of the sum of the squared differences; they cancel no digits.
+        let squares = (a - b).powi(2) + (b - c).powi(2) + (c - a).powi(2);
+        (2.0 * squares).sqrt() / 3.0
+    }
 }
 
 fn unknown(name: &str) -> Error {
@@ -279,6 +363,60 @@ mod tests {
             values(&points, field);
             assert_eq!(PointField::from_name(field.name()), Some(field));
         }
+    }
+
+    /// Of a known stretch, turned out of the axes, and of one so small that its square is round-off.
+    #[test]
+    fn logarithmic_strain_and_its_invariants() {
+        let mut points = sample();
+        let (c, s) = (0.3_f64.cos(), 0.3_f64.sin());
+        let turn = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+        for [a, b] in [[0.5_f64, -0.2], [3e-12, 1e-12]] {
+            let stretch = Matrix3::from_diagonal(&[a.exp(), b.exp(), 1.0].into());
+            // b does not see a rotation before the stretch.
+            points.deformation_gradient[0] = turn * stretch * turn.transpose() * turn;
+            let strain = turn * Matrix3::from_diagonal(&[a, b, 0.0].into()) * turn.transpose();
+            let got = values(&points, PointField::LogStrain);
+            let tolerance = 1e-15_f64.max(1e-14 * a);
+            for (got, index) in got.iter().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
+                approx::assert_abs_diff_eq!(*got, strain[index], epsilon = tolerance);
+            }
+            let volumetric = values(&points, PointField::VolumetricStrain)[0];
+            approx::assert_abs_diff_eq!(volumetric, a + b, epsilon = tolerance);
+            let deviator = strain - Matrix3::identity() * ((a + b) / 3.0);
+            let equivalent = (2.0 / 3.0 * deviator.norm_squared()).sqrt();
+            let got = values(&points, PointField::EquivalentStrain)[0];
+            approx::assert_abs_diff_eq!(got, equivalent, epsilon = tolerance);
+        }
+    }
+
+    /// Triaxial compression sigma = -(100, 100, 300) kPa: p = 500/3, q = 200, sin(phi) = 1/2.
+    #[test]
+    fn stresses_of_soil_mechanics() {
+        let mut points = sample();
+        points.deformation_gradient[0] = Matrix3::identity();
+        let mut with = |stress: [f64; 3], field| {
+            points.kirchhoff_stress[0] = Matrix3::from_diagonal(&stress.into());
+            values(&points, field)
+        };
+        let triaxial = [-100e3, -300e3, -100e3];
+        assert_eq!(with(triaxial, PointField::PrincipalStress), [-100e3, -100e3, -300e3]);
+        approx::assert_relative_eq!(with(triaxial, PointField::MeanStress)[0], 500e3 / 3.0);
+        approx::assert_relative_eq!(with(triaxial, PointField::Deviator)[0], 200e3);
+        let friction = |with: &mut dyn FnMut([f64; 3], PointField) -> Vec<f64>, stress| {
+            with(stress, PointField::MobilisedFriction)[0]
+        };
+        approx::assert_relative_eq!(friction(&mut with, triaxial), 30.0, max_relative = 1e-14);
+        assert_eq!(friction(&mut with, [0.0; 3]), 0.0);
+        assert_eq!(friction(&mut with, [-5.0; 3]), 0.0);
+        assert_eq!(friction(&mut with, [1.0, -5.0, -5.0]), 90.0);
+        assert_eq!(friction(&mut with, [1.0, 5.0, 5.0]), 90.0);
+    }
+
+    #[test]
+    fn the_table_of_fields_is_that_of_the_deck() {
+        let names: Vec<_> = PointField::ALL.iter().map(|field| field.name()).collect();
+        assert_eq!(names, fields::FIELD_NAMES);
     }
 
     #[test]
