@@ -171,6 +171,49 @@ fn slips_of_units_are_warned_of() {
         "material.m={ model = \"von-mises\", young = 1e6, poisson = 0.3, yield_stress = 10.0 }",
     );
     assert!(slip.contains("rho g H / strength = 122.5 is far from usual values"), "{slip}");
+    let soil = |cohesion: &str, friction: &str| {
+        said(&format!(
+            "material.m={{ model = \"mohr-coulomb\", young = 1e6, poisson = 0.3, cohesion = {cohesion}, \
+             friction = {friction}, dilation = 0.0 }}"
+        ))
+    };
+    let good = soil("100.0", "30.0");
+    assert!(good.contains("rho g H / cohesion = 10"), "{good}");
+    assert!(!good.contains("far from usual") && !good.contains("in degrees"), "{good}");
+    let slip = soil("0.1", "30.0");
+    assert!(slip.contains("rho g H / cohesion = 10000 is far from usual values"), "{slip}");
+    let slip = soil("100.0", "0.5236");
+    assert!(slip.contains("is taken in degrees; as radians it would be 30 degrees"), "{slip}");
+}
+
+/// 1.9 t/m3 in place of 1900 kg/m3, where gravity and stiffness are in SI units.
+#[test]
+fn a_density_in_tonnes_is_warned_of() {
+    let said = |density: &str| {
+        let run = Run::text(&deck(&rectangle("b", [0.0, 0.0], [2.0, 1.0])))
+            .set("load.0={ gravity = [0.0, -9.81] }")
+            .set("material.m.young=1e7")
+            .set(format!("body.0.density={density}"));
+        let outcome = run.word("--check").attempt();
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        outcome.stdout
+    };
+    assert!(!said("1900.0").contains("that of foam"));
+    let slip = said("1.9");
+    assert!(slip.contains("density = 1.9 kg/m3 is that of foam"), "{slip}");
+}
+
+/// A corner that one boundary holds and another drives: 0 and 0.01 m are asked of one component.
+#[test]
+fn nodes_held_by_one_boundary_and_moved_by_another_are_told() {
+    let text = deck(&rectangle("b", [0.0, 0.0], [2.0, 1.0]))
+        + "[[boundary]]\nname = \"pulled\"\nwhere = { side = \"bottom\" }\n\
+           displacement = { y = 0.01 }\n";
+    let outcome = Run::text(&text).word("--check").attempt();
+    assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+    let said = outcome.stdout;
+    assert!(said.contains("boundary \"pulled\" moves it; it moves"), "{said}");
+    assert!(said.contains("holds y of the node at [0.0, 0.0] m"), "{said}");
 }
 
 /// c = sqrt(E (1 - nu) / (1 + nu) / (1 - 2 nu) / rho) = 36.69 m/s; the lumped limit is h / c.

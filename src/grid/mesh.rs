@@ -14,6 +14,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::deck::nearest;
 use crate::error::{Error, Result};
 
 use super::FacePair;
@@ -199,8 +200,11 @@ impl<const D: usize> Mesh<D> {
         };
         let kind =
             if self.node_sets.contains_key(tag) { " of cells (it names a boundary)" } else { "" };
+        let tags = self.node_sets.keys().chain(self.cell_sets.keys());
+        let meant = nearest(tag, tags.map(String::as_str).filter(|known| *known != tag));
+        let meant = meant.map_or(String::new(), |known| format!(" (did you mean \"{known}\"?)"));
         Error::Input(format!(
-            "{}: no tag \"{tag}\"{kind}; boundary tags: {}; body tags: {}",
+            "{}: no tag \"{tag}\"{kind}{meant}; boundary tags: {}; body tags: {}",
             self.name,
             list(&self.node_sets),
             list(&self.cell_sets)

@@ -102,6 +102,22 @@ pub fn make_folder(path: &Path) -> Result<()> {
     })
 }
 
+/// Error: a file stands where the directory, or one above it, would have to be. Creates nothing.
+/// Collective.
+pub fn require_place(path: &Path, comm: &SimpleCommunicator) -> Result<()> {
+    on_root(comm, || {
+        let there = path.ancestors().find(|above| above.exists());
+        match there.filter(|above| !above.is_dir()) {
+            Some(file) => Err(Error::File(format!(
+                "cannot create the results directory {}: {} is a file; give --out DIR",
+                path.display(),
+                file.display()
+            ))),
+            None => Ok(()),
+        }
+    })
+}
+
 fn prepare(path: &Path, force: bool, inputs: &Inputs) -> Result<()> {
     make_folder(path)?;
     let found = look(path, &inputs.deck)?;

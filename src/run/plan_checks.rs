@@ -1,7 +1,9 @@
 //! What figures of a plan tell of slips: of units, by ratios that have no unit, and of sizes.
 
+use std::ops::RangeInclusive;
+
 use crate::analysis::time_steps::{TimeSteps, stability_limit};
-use crate::deck::model::{AnalysisType, Every, Load};
+use crate::deck::model::{AnalysisType, Every, Load, Material};
 use crate::deck::rough;
 use crate::loads::Moment;
 use crate::parallel::World;
@@ -14,6 +16,13 @@ use crate::system::model::Model;
 /// factor of a thousand or a million.
 const OVER_YOUNG: [f64; 2] = [1e-9, 10.0];
 const OVER_STRENGTH: [f64; 2] = [1e-6, 50.0];
+const OVER_COHESION: [f64; 2] = [1e-6, 5e3];
+/// kg/m3: the densities of soils, rocks and metals in t/m3, at an acceleration (m/s2) that tells that
+/// the deck is in SI units.
+const FOAMS: RangeInclusive<f64> = 0.5..=25.0;
+const EARTH: RangeInclusive<f64> = 5.0..=15.0;
+/// Degrees: an angle of friction below is probably meant in radians.
+const RADIANS: f64 = 1.2;
 /// Result files beyond this are worth a second thought, bytes.
 const MUCH_OUTPUT: f64 = 1e11;
 
@@ -59,16 +68,49 @@ pub fn weight_ratios<const D: usize>(
             let ratio = weight / strength;
             warning = warning.or(unusual("rho g H / strength", ratio, OVER_STRENGTH));
         }
+        let cohesion = constant(&model.deck.materials[body.material], "cohesion");
+        if let Some(cohesion) = cohesion.filter(|&c| c > 0.0) {
+            let ratio = weight / cohesion;
+            text.push_str(&format!(", rho g H / cohesion = {}", rough(ratio)));
+            warning = warning.or(unusual("rho g H / cohesion", ratio, OVER_COHESION));
+        }
+        let gas = FOAMS.contains(&body.density) && EARTH.contains(&size) && of_young < 1e-3;
+        warning = warning.or_else(|| {
+            gas.then(|| {
+                let density = rough(body.density);
+                format!("density = {density} kg/m3 is that of foam, while soil has 1500 to 2200")
+            })
+        });
         let warning = warning.map(|what| {
             format!(
                 "body \"{}\": {what}; check the units of density (kg/m3), gravity (m/s2), \
-                 young and strength (Pa), and lengths (m)",
+                 young, strength and cohesion (Pa), and lengths (m)",
                 body.name
             )
         });
         rows.push((Some((format!("body {}", body.name), text)), warning));
     }
     rows
+}
+
+/// The value of a material's parameter, if it has it and it is a number.
+fn constant(material: &Material, key: &str) -> Option<f64> {
+    let place = material.model.parameters.iter().position(|known| known.key == key)?;
+    material.parameters[place].as_ref()?.as_constant()
+}
+
+/// Warnings of angles that look like radians.
+pub fn angles(materials: &[Material]) -> Vec<String> {
+    let of_material = |material: &Material| {
+        let friction = constant(material, "friction").filter(|&f| 0.0 < f && f < RADIANS)?;
+        Some(format!(
+            "material \"{}\": friction = {} is taken in degrees; as radians it would be {} degrees",
+            material.name,
+            rough(friction),
+            rough(friction.to_degrees())
+        ))
+    };
+    materials.iter().filter_map(of_material).collect()
 }
 
 fn unusual(what: &str, value: f64, [low, high]: [f64; 2]) -> Option<String> {

@@ -13,7 +13,7 @@ use crate::deck::model::{AnalysisType, Ghost};
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
 use crate::input_file;
-use crate::output::directory::{Inputs, ResultsDirectory};
+use crate::output::directory::{self, Inputs, ResultsDirectory};
 use crate::output::restart::run_lock::RunLock;
 use crate::output::start;
 use crate::output::summary::Status;
@@ -238,21 +238,22 @@ impl Start<'_> {
         drop(active);
         solver::rehearse(world, &model, plan.equations)?;
         if self.arguments.check {
+            directory::require_place(out, comm)?;
             self.log.say("The deck is good; nothing was run (--check).");
             return Ok(());
         }
         lock.take(true, &mut self.log, comm)?;
         let earlier = resume.as_ref().filter(|resume| resume.same_directory);
         let earlier = earlier.map(|resume| (resume.checkpoint.clone(), resume.step));
-        let directory = match earlier {
+        let results = match earlier {
             Some(_) => ResultsDirectory::reopen(out, comm)?,
             None => {
                 let inputs = self.inputs(&model.deck);
                 ResultsDirectory::create(out, self.arguments.force, &inputs, comm)?
             }
         };
-        let checkpointer = Checkpointer::new(&model.deck, physics, &directory);
-        let (log, versions, into) = (self.log, self.versions, directory.clone());
+        let checkpointer = Checkpointer::new(&model.deck, physics, &results);
+        let (log, versions, into) = (self.log, self.versions, results.clone());
         let verbose = self.arguments.voice == cli::Voice::Verbose;
         let opening =
             Opening { directory: into, log, versions, checkpointer, resume, followed, verbose };
@@ -260,9 +261,9 @@ impl Start<'_> {
         // All of the earlier part is known to fit: now it may be changed.
         if let (Some((used, step)), Some(choice)) = (&earlier, &self.arguments.restart) {
             checkpointing::set_later_aside(world, out, choice, used, *step)?;
-            directory.leave_earlier_part(comm)?;
+            results.leave_earlier_part(comm)?;
         }
-        directory.write_decks(&self.text, &resolved, comm)?;
+        results.write_decks(&self.text, &resolved, comm)?;
         recorder.open(world)?;
         if let Some((_, step)) = earlier {
             checkpointing::set_later_frames_aside(world, out, step)?;

@@ -149,9 +149,14 @@ fn check_basis<const D: usize>(deck: &Deck, grid: &Grid<D>) -> Result<()> {
 
 /// Every boundary's tag names nodes of the mesh.
 fn check_tags<const D: usize>(deck: &Deck, grid: &Grid<D>) -> Result<()> {
-    for boundary in &deck.boundaries {
+    for (index, boundary) in deck.boundaries.iter().enumerate() {
         if let model::Place::Tag(tag) = &boundary.place {
-            grid.tagged_nodes(tag)?;
+            let key = format!("boundary.{index}.where.tag");
+            let place = |error: Error| match error {
+                Error::Input(why) => Error::Input(deck.places.say(&key, &why)),
+                other => other,
+            };
+            grid.tagged_nodes(tag).map_err(place)?;
         }
     }
     Ok(())

@@ -140,6 +140,9 @@ fn missing_tags() {
     refused("square.msh", &text, &deck, 2, &["square.msh", "no tag \"top\"", "\"base\""]);
     let deck = DECK.replace("cells = \"all\"", "cells = \"rock\"");
     refused("square.msh", &text, &deck, 2, &["square.msh", "no tag \"rock\""]);
+    let deck = DECK.replace("tag = \"base\"", "tag = \"bsae\"");
+    let words = ["boundary.0.where.tag", "did you mean \"base\"?"];
+    refused("square.msh", &text, &deck, 2, &words);
 }
 
 #[test]

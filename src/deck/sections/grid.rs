@@ -81,9 +81,9 @@ fn whole_cells(table: &Table<'_>, axis: usize, size: f64, h: f64) -> Got<usize> 
     }
     let (fewer, more) = (cells.floor().max(1.0), cells.ceil().max(1.0));
     let near = if fewer == more {
-        figure(fewer * h)
+        length_of(fewer, h)
     } else {
-        format!("{} or {}", figure(fewer * h), figure(more * h))
+        format!("{} or {}", length_of(fewer, h), length_of(more, h))
     };
     let count = if (1e-5..1e15).contains(&cells) { format!("{cells:.6}") } else { figure(cells) };
     if whole >= 1e15 {
@@ -103,6 +103,12 @@ fn whole_cells(table: &Table<'_>, axis: usize, size: f64, h: f64) -> Got<usize> 
             figure(h)
         ),
     ))
+}
+
+/// `cells` spacings of `h` as a user would write them: 6 of 0.3 are 1.8, not 1.7999999999999998.
+fn length_of(cells: f64, h: f64) -> String {
+    let length = cells * h;
+    figure(format!("{length:.12e}").parse().unwrap_or(length))
 }
 
 fn source(table: &Table<'_>, directory: &Path) -> Got<(MeshSource, usize)> {

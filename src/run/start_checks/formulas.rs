@@ -18,6 +18,8 @@ use crate::system::numbering::Numbering;
 use crate::analysis::implicit;
 use crate::system::model::Model;
 
+use super::contest::Contest;
+
 /// Evaluates initial velocities, and loads and boundaries at both ends of the first step, at all
 /// points and nodes. Returns warnings. Errors name the key, its line and a point. Collective.
 pub fn check<const D: usize>(
@@ -168,6 +170,7 @@ fn boundaries<const D: usize>(
 ) -> Result<Vec<String>> {
     let (deck, grid) = (&model.deck, &model.grid);
     let mut warnings = Vec::new();
+    let mut contest = Contest::new(numbering.owned * D);
     for (index, boundary) in deck.boundaries.iter().enumerate() {
         if let Place::Box { min, max } = &boundary.place
             && let Some(why) = without_nodes(grid, min, max)
@@ -198,6 +201,7 @@ fn boundaries<const D: usize>(
             }
             other => other,
         })?;
+        contest.enter(index, &found);
         if !world.any(!found.held_nodes[0].is_empty()) {
             warnings.push(format!(
                 "boundary \"{}\" acts on nothing at the start: no node of it touches a \
@@ -206,6 +210,7 @@ fn boundaries<const D: usize>(
             ));
         }
     }
+    warnings.extend(contest.warning(world, deck, grid, numbering));
     Ok(warnings)
 }
 
