@@ -2,6 +2,7 @@
 
 use crate::deck::model::{Basis, DomainUpdate, Mass};
 use crate::error::Result;
+use crate::mass::solver::MassSolver;
 use crate::output::restart::run_state::RunState;
 use crate::points::Points;
 use crate::points::Snapshot;
@@ -23,6 +24,7 @@ pub struct Explicit<const D: usize> {
     limit: f64,
     ledger: Ledger,
     before: Snapshot<D>,
+    solver: MassSolver,
 }
 
 impl<const D: usize> Explicit<D> {
@@ -35,7 +37,8 @@ impl<const D: usize> Explicit<D> {
         }
         let (ledger, limit) = ledger_at_start(run);
         let steps = TimeSteps::new(&run.model.deck.analysis);
-        Ok(Explicit { steps, limit, ledger, before: Snapshot::default() })
+        let (before, solver) = (Snapshot::default(), MassSolver::default());
+        Ok(Explicit { steps, limit, ledger, before, solver })
     }
 }
 
@@ -62,7 +65,7 @@ impl<const D: usize> Analysis<D> for Explicit<D> {
     }
 
     fn step(&mut self, run: &mut Run<D>, next: Next) -> std::result::Result<Solved<D>, Halt> {
-        let (mut solved, sums) = advance(run, &mut self.before, next.span)?;
+        let (mut solved, sums) = advance(run, &mut self.before, &mut self.solver, next.span)?;
         let entry = Entry::unite(run.world, &run.points, sums);
         let row = &mut solved.row;
         row.step = next.number;

@@ -14,6 +14,7 @@ use crate::tensor::Square;
 
 use crate::mass::grid_mass::{GridMass, Inverse, require_mass};
 use crate::mass::light_nodes::LightNodes;
+use crate::mass::solver::MassSolver;
 use crate::points::Snapshot;
 use crate::record::clock::Clock;
 use crate::system::model::Model;
@@ -70,13 +71,14 @@ impl<'a, const D: usize> Nodes<'a, D> {
         model: &'a Model<D>,
         mesh: &'a Discretisation<D>,
         conditions: &'a Conditions,
-        (mass, light): (&'a GridMass, Option<LightNodes>),
+        (mass, light, solver): (&'a GridMass, Option<LightNodes>, &'a mut MassSolver),
         external: &'a [[f64; D]],
         dt: f64,
     ) -> Result<Self> {
         let mut seconds = 0.0;
-        let inverse =
-            timed(&mut seconds, || mass.inverse(world, &model.grid, mesh, &conditions.fixed))?;
+        let inverse = timed(&mut seconds, || {
+            mass.inverse(world, &model.grid, mesh, &conditions.fixed, solver)
+        })?;
         let held_velocity = conditions.increment.iter().map(|u| u / dt).collect();
         let at_rest = vec![0.0; mesh.numbering.len() * D];
         Ok(Nodes {

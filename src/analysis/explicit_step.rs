@@ -15,6 +15,7 @@ use crate::tensor::Square;
 use super::explicit_nodes::{Forces, Motion, Nodes};
 use crate::mass::grid_mass::GridMass;
 use crate::mass::light_nodes::LightNodes;
+use crate::mass::solver::MassSolver;
 use crate::points::Snapshot;
 use crate::record::context::Run;
 use crate::record::ledger::StepSums;
@@ -33,6 +34,7 @@ use crate::transfer::update::{self, Increments};
 pub(crate) fn advance<const D: usize>(
     run: &mut Run<D>,
     before: &mut Snapshot<D>,
+    solver: &mut MassSolver,
     span: StepSpan,
 ) -> std::result::Result<(Solved<D>, StepSums), Halt> {
     let Run { world, model, points, clock, .. } = run;
@@ -65,7 +67,8 @@ pub(crate) fn advance<const D: usize>(
         }
         None => Vec::new(),
     };
-    let mut nodes = Nodes::new(world, model, &mesh, &conditions, (&mass, light), &external, dt)?;
+    let inertia = (&mass, light, solver);
+    let mut nodes = Nodes::new(world, model, &mesh, &conditions, inertia, &external, dt)?;
     nodes.pressed = &pressed;
 
     let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;

@@ -98,8 +98,11 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let loads = Loads::of_step(world, model, points, &mesh, span)?;
             Ok((loads, mesh.nodes_left_out(world, model.deck.method.drop_below)))
         })?;
-        let inertial = match &self.dynamics {
-            Some(_) => Some(InertialStep::begin(run, &mesh, &conditions, &left_out, &loads, span)?),
+        let inertial = match &mut self.dynamics {
+            Some(dynamics) => {
+                let by = (span, &mut dynamics.solver);
+                Some(InertialStep::begin(run, &mesh, &conditions, &left_out, &loads, by)?)
+            }
             None => None,
         };
         let Run { clock, .. } = &mut *run;

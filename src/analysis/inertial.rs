@@ -14,6 +14,7 @@
 
 use crate::error::Result;
 use crate::mass::grid_mass::{GridMass, Inverse};
+use crate::mass::solver::MassSolver;
 use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
 use crate::petsc::log::Phase;
@@ -42,13 +43,15 @@ pub(super) struct Dynamics<const D: usize> {
     /// u K_G u / 2 of all steps, J.
     ghost_energy: f64,
     pub before: Snapshot<D>,
+    pub solver: MassSolver,
 }
 
 impl<const D: usize> Dynamics<D> {
     /// Before the first step. Collective.
     pub fn new(run: &Run<D>) -> Self {
         let (ledger, _) = ledger_at_start(run);
-        Dynamics { ledger, ghost_energy: 0.0, before: Snapshot::default() }
+        let (before, solver) = (Snapshot::default(), MassSolver::default());
+        Dynamics { ledger, ghost_energy: 0.0, before, solver }
     }
 
     pub fn save(&self, state: &mut RunState) {
@@ -105,7 +108,7 @@ impl InertialStep {
         conditions: &Conditions,
         left_out: &[bool],
         loads: &Loads<D>,
-        span: StepSpan,
+        (span, solver): (StepSpan, &mut MassSolver),
     ) -> Result<Self> {
         let Run { world, model, points, clock, .. } = run;
         let newmark = Newmark::new(&model.deck.analysis, span.time_end - span.time_start);
@@ -122,7 +125,7 @@ impl InertialStep {
         })?;
         let (start, momentum) = clock.time(Phase::Solve, || {
             let held = held_or_left_out::<D>(conditions, left_out);
-            let inverse = mass.inverse(world, &model.grid, mesh, &held)?;
+            let inverse = mass.inverse(world, &model.grid, mesh, &held, solver)?;
             let carried = newmark.alpha != 0.0 && span.time_start > 0.0;
             let sums = match carried {
                 false => share_at_start,

@@ -9,7 +9,7 @@
 
 use crate::deck::model::{AnalysisType, Locking, Tangent};
 use crate::error::Result;
-use crate::mass::inverse;
+use crate::mass::solver as mass;
 use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
@@ -240,8 +240,9 @@ fn factors(prefix: &str) -> Result<bool> {
 /// first step. Collective. Error: PETSc cannot work with them.
 pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usize) -> Result<()> {
     let comm = world.comm();
-    if let Some(rehearsal) = Rehearsal::new(inverse::PREFIX)? {
-        rehearsal.linear::<1>(comm, |prefix| inverse::petsc_solver(world, prefix))?;
+    if let Some(rehearsal) = Rehearsal::new(mass::PREFIX)? {
+        // The program's own preconditioner needs a mass.
+        rehearsal.linear::<1>(comm, |prefix| mass::petsc_solver(world, prefix, "jacobi"))?;
     }
     if let Some(rehearsal) = Rehearsal::new(extremes::PREFIX)? {
         rehearsal.linear::<D>(comm, |prefix| extremes::petsc_solver(world, prefix))?;

@@ -3,6 +3,7 @@
 
 use super::inverse::MassInverse;
 use super::matrix;
+use super::solver::MassSolver;
 use crate::deck::model::Mass;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -54,13 +55,15 @@ impl GridMass {
         }
     }
 
-    /// Prepares solves with the held degrees of freedom (local). Collective.
+    /// Prepares solves with the held degrees of freedom (local), a consistent mass by `solver`.
+    /// Collective.
     pub fn inverse<'a, const D: usize>(
         &'a self,
         world: &'a World,
-        grid: &Grid<D>,
+        grid: &'a Grid<D>,
         mesh: &'a Discretisation<D>,
         held: &'a [bool],
+        solver: &'a mut MassSolver,
     ) -> Result<Inverse<'a, D>> {
         let how = match self {
             GridMass::Lumped(mass) => How::Lumped(mass),
@@ -71,6 +74,7 @@ impl GridMass {
                 &mesh.pattern,
                 matrix,
                 held,
+                solver,
             )?)),
         };
         Ok(Inverse { world, mesh, held, how })

@@ -1,52 +1,46 @@
 //! M x = b (Ghost eq. 6, 10) for all components at once, with values prescribed at some nodes.
 //!
-//! Small systems of one rank are factored; larger ones are solved by conjugate gradients
-//! ([`crate::mass::iteration`]) with an incomplete factor as preconditioner, all components in lockstep.
-//! With any PETSc option `-mass_...` the system goes to PETSc instead (default there: `cg`,
-//! `jacobi`, relative tolerance 1e-14), component by component.
+//! PETSc's KSP iterates over all components of all right-hand sides as one vector: conjugate
+//! gradients with an incomplete factor that spans the ranks, or what options `-mass_...` say. It
+//! solves for what a first guess lacks, M d = b - M x0, with each column scaled to a right-hand side
+//! near one: columns of different size (momentum beside force) share the iteration and its end.
 
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::parallel::World;
-use crate::petsc::{Ksp, Matrix, options};
+use crate::petsc::KspOutcome;
 
 use super::elimination::Order;
-use super::envelope::{self, Envelope};
 use super::incomplete::Incomplete;
-use super::iteration::Iteration;
 use super::matrix;
+use super::solver::MassSolver;
+use super::system::{Product, System};
 use crate::system::border::Border;
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockMatrix;
 
-/// Factoring wins while its operations per stored entry stay below this.
-const FACTOR_BELOW: f64 = 60.0;
+/// Where round-off stops the iteration before its tolerance, this relative residual is accepted.
+const ACCEPTABLE: f64 = 1e-10;
 
 /// A mass matrix ready to be inverted. `D` components, each with its own held nodes.
 pub struct MassInverse<'a, const D: usize> {
     world: &'a World,
+    grid: &'a Grid<D>,
     numbering: &'a Numbering,
     pattern: &'a Pattern,
     matrix: &'a BlockMatrix<1>,
+    solver: &'a mut MassSolver,
+    /// The preconditioner, unless the user has named another.
+    factor: Option<Incomplete>,
+    rows: Border,
     /// Per owned degree of freedom: to be solved for.
     free: Vec<bool>,
-    method: Method<D>,
-    /// Iterations so far, over all components (the largest of them where they run together).
-    pub iterations: usize,
-}
-
-enum Method<const D: usize> {
-    /// A factor, and which one serves each component.
-    Direct(Vec<Envelope>, [usize; D]),
-    Iterative(Box<Start>),
-    Petsc(Box<Ksp>),
-}
-
-struct Start {
-    preconditioner: Incomplete,
+    /// One over the lumped mass, per owned node: where the iteration starts without a guess. For
+    /// a constant field that is the solution. Zero where there is no mass.
     inverse_row_sum: Vec<f64>,
-    rows: Border,
+    /// Iterations so far.
+    pub iterations: usize,
 }
 
 /// A right-hand side with what is prescribed taken to it, and what is prescribed.
@@ -59,51 +53,43 @@ struct Prepared {
 
 impl<'a, const D: usize> MassInverse<'a, D> {
     /// `held`: per local degree of freedom, prescribed by a condition. Nodes without any mass
-    /// are held at zero. Collective. Error: a factor that does not exist, with its node.
+    /// are held at zero. `solver` serves any number of matrices, one after the other. Collective.
     pub fn new(
         world: &'a World,
-        grid: &Grid<D>,
+        grid: &'a Grid<D>,
         numbering: &'a Numbering,
         pattern: &'a Pattern,
         matrix: &'a BlockMatrix<1>,
         held: &[bool],
+        solver: &'a mut MassSolver,
     ) -> Result<Self> {
-        let rows = numbering.owned;
-        let diagonal: Vec<f64> = (0..rows)
+        let owned = numbering.owned;
+        let diagonal: Vec<f64> = (0..owned)
             .map(|row| pattern.diagonal(row).map_or(0.0, |entry| matrix.values[entry]))
             .collect();
-        let free: Vec<bool> =
-            (0..rows * D).map(|dof| !held[dof] && diagonal[dof / D] != 0.0).collect();
-        let method = if options::any_set(PREFIX)? {
-            Method::Petsc(Box::new(petsc_solver(world, PREFIX)?))
-        } else if world.size() == 1
-            && envelope::cost(pattern, rows) < FACTOR_BELOW * pattern.ghost_start as f64
-        {
-            let (factors, which) = factors::<D>(matrix, pattern, &free).map_err(|row| {
-                Error::Run(format!(
-                    "the consistent mass matrix is not positive definite: the node at {:?} m \
-                     hardly carries any mass; stabilise it ([ghost] mass_factor = 0.25) or use \
-                     method.mass = \"lumped\"",
-                    grid.node_position(numbering.nodes[row])
-                ))
-            })?;
-            Method::Direct(factors, which)
-        } else {
-            let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
-            let border = pattern.border(rows);
-            let order = Order::new(grid, numbering, pattern, &border);
-            Method::Iterative(Box::new(Start {
-                preconditioner: Incomplete::factor(
-                    world, order, matrix, numbering, pattern, &diagonal,
-                ),
-                inverse_row_sum: matrix::row_sums(matrix, pattern, rows)
-                    .iter()
-                    .map(one_over)
-                    .collect(),
-                rows: border,
-            }))
-        };
-        Ok(MassInverse { world, numbering, pattern, matrix, free, method, iterations: 0 })
+        let free = (0..owned * D).map(|dof| !held[dof] && diagonal[dof / D] != 0.0).collect();
+        solver.forget(world)?;
+        let rows = pattern.border(owned);
+        let factor = solver.of(world, 1)?.preconditions_by_ours().then(|| {
+            let order = Order::new(grid, numbering, pattern, &rows);
+            Incomplete::factor(world, order, matrix, numbering, pattern, &diagonal)
+        });
+        let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
+        let sums = matrix::row_sums(matrix, pattern, owned);
+        let inverse_row_sum = sums.iter().map(one_over).collect();
+        Ok(MassInverse {
+            world,
+            grid,
+            numbering,
+            pattern,
+            matrix,
+            solver,
+            factor,
+            rows,
+            free,
+            inverse_row_sum,
+            iterations: 0,
+        })
     }
 
     /// Solves for the free values. `rhs`: owned degrees of freedom; `prescribed`: local ones,
@@ -115,7 +101,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         Ok(x)
     }
 
-    /// [`Self::solve`] with local values `guess` near the solution, where an iteration may start.
+    /// [`Self::solve`] with local values `guess` near the solution, where the iteration may start.
     /// The ghosts are left without their values.
     pub fn solve_from(
         &mut self,
@@ -124,47 +110,128 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         guess: Option<&[f64]>,
     ) -> Result<Vec<f64>> {
         let [prepared] = self.prepare([rhs], [prescribed])?;
-        let solution = match &self.method {
-            Method::Iterative(start) => {
-                let guess = guess.map(|guess| self.freed(guess));
-                let guess = guess.as_ref().map(|guess| guess.as_chunks::<D>().0);
-                let (b, free) = (prepared.b.as_chunks::<D>().0, self.free.as_chunks::<D>().0);
-                let (x, iterations) = self.iteration(start).solve(b, free, guess)?;
-                self.iterations += iterations;
-                x.into_flattened()
-            }
-            Method::Direct(factors, which) => {
-                let mut b = prepared.b;
-                for (k, &factor) in which.iter().enumerate() {
-                    factors[factor].solve(&mut b, D, k);
-                }
-                b
-            }
-            Method::Petsc(_) => self.by_petsc(&prepared.b)?,
-        };
+        let guess = guess.map(|guess| self.freed(guess));
+        let guess = guess.as_ref().map(|guess| guess.as_chunks::<D>().0);
+        let free = self.free.clone();
+        let (b, free) = (prepared.b.as_chunks::<D>().0, free.as_chunks::<D>().0);
+        let solution = self.solve_columns(1, b, free, guess)?.into_flattened();
         Ok(self.complete(solution, prepared.x))
     }
 
-    /// [`Self::solve_from`] for two right-hand sides, in one iteration where there is one.
+    /// [`Self::solve_from`] for two right-hand sides in one iteration.
     pub fn solve_two(
         &mut self,
         rhs: [&[f64]; 2],
         prescribed: [&[f64]; 2],
     ) -> Result<[Vec<f64>; 2]> {
-        let Method::Iterative(start) = &self.method else {
-            let first = self.solve_from(rhs[0], prescribed[0], None)?;
-            return Ok([first, self.solve_from(rhs[1], prescribed[1], None)?]);
-        };
         let [first, second] = self.prepare(rhs, prescribed)?;
-        let iteration = self.iteration(start);
         // Twice D is not a constant that the language can compute from D.
-        let (solutions, iterations) = match D {
-            2 => side_by_side::<D, 4>(&iteration, [&first.b, &second.b], &self.free)?,
-            _ => side_by_side::<D, 6>(&iteration, [&first.b, &second.b], &self.free)?,
+        let solutions = match D {
+            2 => self.side_by_side::<4>([&first.b, &second.b])?,
+            _ => self.side_by_side::<6>([&first.b, &second.b])?,
         };
-        self.iterations += iterations;
         let [one, two] = solutions;
         Ok([self.complete(one, first.x), self.complete(two, second.x)])
+    }
+
+    /// Two right-hand sides of `D` values per node as one of `C` = 2 `D`.
+    fn side_by_side<const C: usize>(&mut self, rhs: [&[f64]; 2]) -> Result<[Vec<f64>; 2]> {
+        let joined = |k: usize, node: usize| rhs[k / D][node * D + k % D];
+        let nodes = self.numbering.owned;
+        let b: Vec<[f64; C]> =
+            (0..nodes).map(|node| std::array::from_fn(|k| joined(k, node))).collect();
+        let free: Vec<[bool; C]> =
+            (0..nodes).map(|node| std::array::from_fn(|k| self.free[node * D + k % D])).collect();
+        let x = self.solve_columns(2, &b, &free, None)?;
+        let part = |side: usize| -> Vec<f64> {
+            x.iter().flat_map(|x| x[side * D..side * D + D].iter().copied()).collect()
+        };
+        Ok([part(0), part(1)])
+    }
+
+    /// The solution at the owned nodes. `free`: the values to be solved for, the others stay zero,
+    /// as they are in `b` and `guess`, the place to start from. Collective.
+    fn solve_columns<const C: usize>(
+        &mut self,
+        sides: usize,
+        b: &[[f64; C]],
+        free: &[[bool; C]],
+        guess: Option<&[[f64; C]]>,
+    ) -> Result<Vec<[f64; C]>> {
+        let MassInverse { world, numbering, pattern, matrix, rows, solver, factor, .. } = self;
+        let product = Product { world, numbering, pattern, matrix, rows };
+        let mut x = vec![[0.0; C]; numbering.len()];
+        match guess {
+            Some(guess) => x[..b.len()].copy_from_slice(guess),
+            None => {
+                for ((x, b), inverse) in x.iter_mut().zip(b).zip(&self.inverse_row_sum) {
+                    *x = b.map(|b| b * inverse);
+                }
+            }
+        }
+        let mut r = vec![[0.0; C]; b.len()];
+        product.multiply(&mut x, &mut r);
+        let mut sizes = [[0.0; C]; 2];
+        for (row, inverse) in self.inverse_row_sum.iter().map(|inverse| inverse.abs()).enumerate() {
+            for k in 0..C {
+                r[row][k] = if free[row][k] { b[row][k] - r[row][k] } else { 0.0 };
+                sizes[0][k] += b[row][k] * b[row][k] * inverse;
+                sizes[1][k] += r[row][k] * r[row][k] * inverse;
+            }
+        }
+        let sums = world.sum_slice(sizes.as_flattened());
+        // Powers of two leave the digits as they are.
+        let scale: [f64; C] = std::array::from_fn(|k| match sums[k].sqrt() {
+            size if size.is_normal() => size.log2().round().exp2(),
+            _ => 1.0,
+        });
+        // Accelerations of nearly empty nodes are no place to start from.
+        let restart: [bool; C] = std::array::from_fn(|k| !(sums[C + k] < sums[k]));
+        x.truncate(b.len());
+        for (row, (x, r)) in x.iter_mut().zip(&mut r).enumerate() {
+            for k in 0..C {
+                if restart[k] {
+                    (x[k], r[k]) = (0.0, b[row][k]);
+                }
+                r[k] /= scale[k];
+            }
+        }
+        let mut found = vec![[0.0; C]; b.len()];
+        let mut system = System::new(product, factor.as_ref(), free);
+        let (right, left) = (r.as_flattened(), found.as_flattened_mut());
+        let outcome = solver.of(world, sides)?.solve(world.comm(), &mut system, right, left)?;
+        self.iterations += outcome.iterations;
+        self.require(outcome)?;
+        for (x, found) in x.iter_mut().zip(&found) {
+            for k in 0..C {
+                x[k] += scale[k] * found[k];
+            }
+        }
+        Ok(x)
+    }
+
+    /// Error: the solve failed, with the node that has the least mass. Collective if it did.
+    fn require(&self, outcome: KspOutcome) -> Result<()> {
+        // The right-hand sides are about one.
+        if outcome.converged || outcome.residual_norm <= ACCEPTABLE {
+            return Ok(());
+        }
+        let mass = |row: usize| self.pattern.diagonal(row).map(|entry| self.matrix.values[entry]);
+        let lightest = (0..self.numbering.owned)
+            .filter_map(|row| Some((mass(row).filter(|mass| *mass != 0.0)?, row)))
+            .min_by(|a, b| a.0.total_cmp(&b.0));
+        let least = self.world.min(lightest.map_or(f64::INFINITY, |(mass, _)| mass));
+        let mine = lightest
+            .filter(|(mass, _)| *mass <= least)
+            .map(|(_, row)| format!("{:?}", self.grid.node_position(self.numbering.nodes[row])));
+        let place = self.world.first_message(mine).unwrap_or_default();
+        Err(Error::Run(format!(
+            "the consistent mass cannot be inverted: its solver ended with {} after {} iterations \
+             (relative residual {:.1e}); the matrix is near singular, and the node at {place} m \
+             hardly carries any mass; stabilise it ([ghost] mass_factor = 0.25) or use \
+             method.mass = \"lumped\"",
+            outcome.reason, outcome.iterations, outcome.residual_norm
+        )))
     }
 
     /// Collective. Error: a right-hand side that is not finite.
@@ -224,125 +291,4 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     fn freed(&self, values: &[f64]) -> Vec<f64> {
         values.iter().zip(&self.free).map(|(v, free)| if *free { *v } else { 0.0 }).collect()
     }
-
-    fn iteration<'b>(&'b self, start: &'b Start) -> Iteration<'b> {
-        Iteration {
-            world: self.world,
-            numbering: self.numbering,
-            pattern: self.pattern,
-            matrix: self.matrix,
-            preconditioner: &start.preconditioner,
-            inverse_row_sum: &start.inverse_row_sum,
-            rows: &start.rows,
-        }
-    }
-
-    fn by_petsc(&mut self, b: &[f64]) -> Result<Vec<f64>> {
-        let mut x = b.to_vec();
-        let mut offsets = vec![0i32];
-        let mut columns = Vec::new();
-        for row in 0..self.numbering.owned {
-            let range = self.pattern.offsets[row]..self.pattern.offsets[row + 1];
-            columns.extend(
-                self.pattern.columns[range].iter().map(|&c| self.numbering.global[c as usize]),
-            );
-            offsets.push(columns.len() as i32);
-        }
-        for k in 0..D {
-            let values = self.constrained(k)?;
-            let comm = self.world.comm();
-            let mut matrix =
-                Matrix::from_csr(comm, 1, self.numbering.owned, &offsets, &columns, &values)?;
-            matrix.set_spd(true)?;
-            let (mut right, mut left) = (matrix.vector()?, matrix.vector()?);
-            for (value, b) in right.values_mut()?.iter_mut().zip(b.iter().skip(k).step_by(D)) {
-                *value = *b;
-            }
-            let Method::Petsc(ksp) = &mut self.method else { break };
-            ksp.set_operators(&matrix)?;
-            let outcome = ksp.solve(&right, &mut left)?.require("the consistent mass")?;
-            self.iterations += outcome.iterations;
-            for (value, solved) in x.iter_mut().skip(k).step_by(D).zip(left.values()?.iter()) {
-                *value = *solved;
-            }
-        }
-        Ok(x)
-    }
-
-    /// Values with the rows and columns held in component `k` replaced by the identity.
-    fn constrained(&self, k: usize) -> Result<Vec<f64>> {
-        let mut free = vec![0.0; self.numbering.len()];
-        for (node, mark) in free.iter_mut().enumerate().take(self.numbering.owned) {
-            *mark = f64::from(u8::from(self.free[node * D + k]));
-        }
-        self.numbering.halo.forward(self.world, &mut free, 1)?;
-        let mut values = self.matrix.values[..self.pattern.ghost_start].to_vec();
-        for row in 0..self.numbering.owned {
-            for entry in self.pattern.offsets[row]..self.pattern.offsets[row + 1] {
-                let column = self.pattern.columns[entry] as usize;
-                if free[row] == 0.0 || free[column] == 0.0 {
-                    values[entry] = if column == row { 1.0 } else { 0.0 };
-                }
-            }
-        }
-        Ok(values)
-    }
-}
-
-/// Two right-hand sides of `D` values per node as one of `C` = 2 `D`.
-fn side_by_side<const D: usize, const C: usize>(
-    iteration: &Iteration<'_>,
-    rhs: [&[f64]; 2],
-    free: &[bool],
-) -> Result<([Vec<f64>; 2], usize)> {
-    let joined = |k: usize, node: usize| rhs[k / D][node * D + k % D];
-    let nodes = free.len() / D;
-    let b: Vec<[f64; C]> =
-        (0..nodes).map(|node| std::array::from_fn(|k| joined(k, node))).collect();
-    let free: Vec<[bool; C]> =
-        (0..nodes).map(|node| std::array::from_fn(|k| free[node * D + k % D])).collect();
-    let (x, iterations) = iteration.solve(&b, &free, None)?;
-    let part = |side: usize| -> Vec<f64> {
-        x.iter().flat_map(|x| x[side * D..side * D + D].iter().copied()).collect()
-    };
-    Ok(([part(0), part(1)], iterations))
-}
-
-/// Of the options that hand the system to PETSc.
-pub const PREFIX: &str = "mass_";
-
-/// PETSc's solver with options of this prefix.
-pub fn petsc_solver(world: &World, prefix: &str) -> Result<Ksp> {
-    let mut ksp = Ksp::new(world.comm(), prefix)?;
-    ksp.set_defaults(&[
-        ("ksp_type", "cg"),
-        ("pc_type", "jacobi"),
-        ("ksp_rtol", "1e-14"),
-        ("ksp_max_it", "5000"),
-    ])?;
-    ksp.set_from_options()?;
-    Ok(ksp)
-}
-
-/// One factor per distinct set of held nodes. Error: the row without a pivot.
-fn factors<const D: usize>(
-    matrix: &BlockMatrix<1>,
-    pattern: &Pattern,
-    free: &[bool],
-) -> std::result::Result<(Vec<Envelope>, [usize; D]), usize> {
-    let mut masks: Vec<Vec<bool>> = Vec::new();
-    let mut made = Vec::new();
-    let mut which = [0; D];
-    for (k, slot) in which.iter_mut().enumerate() {
-        let mask: Vec<bool> = free.iter().skip(k).step_by(D).copied().collect();
-        *slot = match masks.iter().position(|other| *other == mask) {
-            Some(same) => same,
-            None => {
-                made.push(Envelope::factor(matrix, pattern, &mask)?);
-                masks.push(mask);
-                made.len() - 1
-            }
-        };
-    }
-    Ok((made, which))
 }

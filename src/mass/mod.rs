@@ -5,15 +5,15 @@
 //! | `matrix.rs` | consistent, stabilised and lumped mass (Ghost eq. 7, 15, 24) |
 //! | `grid_mass.rs` | which of them a step uses (Ghost eq. 10) |
 //! | `light_nodes.rs` | nodes with hardly any mass, or less, move along with the points |
-//! | `inverse.rs`, `envelope.rs` | M x = b for all components at once |
-//! | `iteration.rs` | conjugate gradients on several right-hand sides |
-//! | `incomplete.rs`, `elimination.rs` | their preconditioner: Cholesky without fill, and its order |
+//! | `inverse.rs` | M x = b for all components at once |
+//! | `solver.rs`, `system.rs` | PETSc's KSP for it; the product and the preconditioner that it calls |
+//! | `incomplete.rs`, `elimination.rs` | that preconditioner: Cholesky without fill, and its order |
 
 pub mod elimination;
-pub mod envelope;
 pub mod grid_mass;
 pub mod incomplete;
 pub mod inverse;
-pub mod iteration;
 pub mod light_nodes;
 pub mod matrix;
+pub mod solver;
+pub mod system;

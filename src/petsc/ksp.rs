@@ -132,7 +132,16 @@ impl Ksp {
     pub fn solve(&mut self, b: &Vector, x: &mut Vector) -> Result<KspOutcome> {
         petsc!(KSPSolve(self.raw, b.raw(), x.raw()))
             .map_err(|error| unless_shared(&self.comm, error))?;
+        self.outcome()
+    }
+
+    /// How the last solve ended, the same on all ranks. Collective.
+    pub(crate) fn outcome(&self) -> Result<KspOutcome> {
         outcome(self.raw, &self.comm).map(|(outcome, _)| outcome)
+    }
+
+    pub(crate) fn raw(&self) -> sys::KSP {
+        self.raw
     }
 
     /// Method and preconditioner in use, for the report: for example "cg + mg".

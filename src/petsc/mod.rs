@@ -20,6 +20,7 @@
 //! | `blas.rs` | the kernel that OpenBLAS runs |
 //! | `object.rs` | handles given back when they go out of scope |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
+//! | `shell.rs` | [`ShellKsp`]: the same where the matrix is a product of the program's |
 //! | `snes.rs` | [`Snes`]: Newton's method over the callbacks of a [`NewtonProblem`] |
 //! | `forcing.rs` | [`Forcing`]: how well each linear solve of Newton's method is worth doing |
 //! | `log.rs` | [`log::Phase`]: stages seen by `-log_view` |
@@ -44,6 +45,7 @@ mod object;
 pub mod options;
 mod rehearsal;
 pub mod session;
+mod shell;
 pub mod snes;
 mod stored;
 pub mod sys;
@@ -60,6 +62,7 @@ pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
 pub use rehearsal::Rehearsal;
 pub use session::{Session, version};
+pub use shell::{ShellKsp, ShellSystem};
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
 pub use stored::Stored;
 pub use vector::Vector;

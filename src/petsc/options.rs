@@ -44,12 +44,6 @@ pub fn is_users(name: &str) -> Result<bool> {
     Ok(!built_in(|names| names.contains(&dashed(name))) && is_set(name)?)
 }
 
-/// Is any option set that starts like this? Asking does not count as reading it.
-pub fn any_set(prefix: &str) -> Result<bool> {
-    let prefix = dashed(prefix);
-    Ok(all()?.split_whitespace().any(|word| word.starts_with(&prefix)))
-}
-
 /// The whole database as PETSc prints it.
 fn all() -> Result<String> {
     require_running()?;

@@ -1,0 +1,117 @@
+//! The mass as PETSc's KSP sees it: M ⊗ 1 over all components of all right-hand sides, a product and
+//! a preconditioner of the program's. One sweep over the scalar matrix serves `C` columns.
+
+use std::ops::Range;
+
+use crate::error::Result;
+use crate::parallel::World;
+use crate::petsc::{Matrix, ShellSystem};
+use crate::system::border::Border;
+use crate::system::numbering::Numbering;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockMatrix;
+
+use super::incomplete::Incomplete;
+use super::matrix;
+
+/// The matrix and what its products need.
+#[derive(Clone, Copy)]
+pub struct Product<'a> {
+    pub world: &'a World,
+    pub numbering: &'a Numbering,
+    pub pattern: &'a Pattern,
+    pub matrix: &'a BlockMatrix<1>,
+    /// The owned rows by whether they have columns of other ranks.
+    pub rows: &'a Border,
+}
+
+impl Product<'_> {
+    /// y = M x; `x` has local values, and its ghosts come while inner rows are multiplied.
+    /// Collective.
+    pub fn multiply<const C: usize>(&self, x: &mut [[f64; C]], y: &mut [[f64; C]]) {
+        let y = y.as_flattened_mut();
+        let mut rows = |runs: &[Range<usize>], x: &[f64]| {
+            for run in runs {
+                matrix::multiply_rows::<C>(self.matrix, self.pattern, run.clone(), x, y);
+            }
+        };
+        let flat = x.as_flattened_mut();
+        self.numbering.halo.forward_while(self.world, [flat], C, |[x]| rows(&self.rows.inner, x));
+        rows(&self.rows.reaching, x.as_flattened());
+    }
+}
+
+/// `C` columns, of which some values are held at zero: their rows are those of the identity.
+pub struct System<'a, const C: usize> {
+    product: Product<'a>,
+    /// `None`: PETSc's preconditioner is used.
+    factor: Option<&'a Incomplete>,
+    /// Of owned nodes: to be solved for.
+    free: &'a [[bool; C]],
+    /// Values at local nodes.
+    local: Vec<[f64; C]>,
+}
+
+impl<'a, const C: usize> System<'a, C> {
+    pub fn new(
+        product: Product<'a>,
+        factor: Option<&'a Incomplete>,
+        free: &'a [[bool; C]],
+    ) -> Self {
+        System { product, factor, free, local: vec![[0.0; C]; product.numbering.len()] }
+    }
+}
+
+impl<const C: usize> ShellSystem for System<'_, C> {
+    fn multiply(&mut self, x: &[f64], y: &mut [f64]) -> Result<()> {
+        let (x, y) = (x.as_chunks::<C>().0, y.as_chunks_mut::<C>().0);
+        self.local[..x.len()].copy_from_slice(x);
+        self.product.multiply(&mut self.local, y);
+        for ((y, x), free) in y.iter_mut().zip(x).zip(self.free) {
+            for k in 0..C {
+                y[k] = if free[k] { y[k] } else { x[k] };
+            }
+        }
+        Ok(())
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        let (r, z) = (r.as_chunks::<C>().0, z.as_chunks_mut::<C>().0);
+        let Some(factor) = self.factor else {
+            z.copy_from_slice(r);
+            return Ok(());
+        };
+        let Product { world, numbering, .. } = self.product;
+        factor.apply(world, numbering, r, self.free, &mut self.local)?;
+        z.copy_from_slice(&self.local[..z.len()]);
+        Ok(())
+    }
+
+    fn entries(&self) -> Result<Matrix> {
+        let Product { world, numbering, pattern, matrix, .. } = self.product;
+        let mut free = vec![[0.0; C]; numbering.len()];
+        for (marks, free) in free.iter_mut().zip(self.free) {
+            *marks = free.map(|free| f64::from(u8::from(free)));
+        }
+        numbering.halo.forward(world, free.as_flattened_mut(), C)?;
+        let (mut offsets, mut columns, mut values) = (vec![0i32], Vec::new(), Vec::new());
+        for row in 0..numbering.owned {
+            for k in 0..C {
+                for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
+                    let column = pattern.columns[entry] as usize;
+                    columns.push(numbering.global[column] * C as i32 + k as i32);
+                    values.push(if free[row][k] > 0.0 && free[column][k] > 0.0 {
+                        matrix.values[entry]
+                    } else {
+                        f64::from(u8::from(column == row))
+                    });
+                }
+                offsets.push(columns.len() as i32);
+            }
+        }
+        let rows = numbering.owned * C;
+        let mut entries = Matrix::from_csr(world.comm(), C, rows, &offsets, &columns, &values)?;
+        entries.set_spd(true)?;
+        Ok(entries)
+    }
+}
