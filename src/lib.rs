@@ -15,6 +15,7 @@
 //! | (d) multigrid's levels | [`amg`] |
 //! | a step's equations and their terms (Lagrangian eq. 27-29) | [`system`] |
 //! | external forces | [`loads`] |
+//! | surfaces of bodies and the points that carry them | [`surface`] |
 //! | Ghost faces and their matrix (Ghost §3, §4) | [`ghost`] |
 //! | who owns what, migration | [`parallel`] |
 //! | strains, stress measures and tangents in three frames (Lagrangian §3-5, App. A) | [`mechanics`] |
@@ -46,6 +47,7 @@ pub mod petsc;
 pub mod points;
 pub mod record;
 pub mod run;
+pub mod surface;
 pub mod system;
 pub mod tensor;
 pub mod transfer;

@@ -315,11 +315,11 @@ fn a_dead_traction_presses_a_column_as_the_closed_form_says() {
 }
 
 #[test]
-fn a_traction_needs_a_side() {
-    let disc = "body.0.shape={disc={centre=[0.25,1],radius=0.2}}";
-    let outcome = Run::of("traction-column").set(disc).attempt();
+fn a_traction_needs_a_surface() {
+    let formula = "body.0.shape={intersection=[{where=\"x < 0.4\"},{box={min=[0,0],max=[0.5,1]}}]}";
+    let outcome = Run::of("traction-column").set(formula).attempt();
     assert_eq!(outcome.code, 2);
-    assert!(outcome.said().contains("is not a box along the axes"), "{}", outcome.said());
+    assert!(outcome.said().contains("of which no surface is known"), "{}", outcome.said());
 }
 
 /// Pressed on top alone, the base carries p A but for the error of the sum over the fall: 3e-4 with

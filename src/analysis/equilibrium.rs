@@ -24,8 +24,8 @@ use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
 use crate::system::terms::Term;
+use crate::system::terms::following::Following;
 use crate::system::terms::ghost::Ghost;
-use crate::system::terms::pressure::PressureTerm;
 use crate::system::terms::stress::{StepPoints, Stress};
 use crate::system::terms::term::{At, Health, Part};
 
@@ -70,7 +70,7 @@ pub struct Equilibrium<'a, const D: usize> {
     /// All external forces of the last evaluation.
     external_owned: Vec<f64>,
     external_previous: Vec<f64>,
-    pressure: Option<Pressed<'a, D>>,
+    following: Option<Followed<'a, D>>,
     /// What is summed, in this order.
     terms: Vec<Box<dyn Term<D> + 'a>>,
     layout: Layout<D>,
@@ -102,9 +102,8 @@ pub struct Equilibrium<'a, const D: usize> {
 }
 
 /// External forces that follow the motion.
-struct Pressed<'a, const D: usize> {
-    term: PressureTerm<'a>,
-    step: StepPoints<'a, D>,
+struct Followed<'a, const D: usize> {
+    loads: Following<'a, D>,
     /// Share of the forces of a step's end in its equations: 1 + alpha of the HHT method.
     share: f64,
     /// What acts besides, owned.
@@ -113,7 +112,7 @@ struct Pressed<'a, const D: usize> {
     force: Vec<f64>,
 }
 
-impl<const D: usize> Pressed<'_, D> {
+impl<const D: usize> Followed<'_, D> {
     /// external = dead + share force, from this rank's shares of `force` at its local nodes.
     /// Collective.
     fn join(
@@ -184,7 +183,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             increment,
             external_previous: external_owned.clone(),
             external_owned,
-            pressure: None,
+            following: None,
             terms,
             layout,
             beside,
@@ -206,22 +205,17 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         })
     }
 
-    /// The same equations with pressures on the bodies' surfaces; `share`: 1 + alpha of the HHT
+    /// The same equations with external forces that follow the motion; `share`: 1 + alpha of the HHT
     /// method, else 1.
-    pub fn with_pressure(
-        mut self,
-        term: Option<PressureTerm<'a>>,
-        step: StepPoints<'a, D>,
-        share: f64,
-    ) -> Self {
+    pub fn with_following(mut self, loads: Option<Following<'a, D>>, share: f64) -> Self {
         let (dead, force) = (self.external_owned.clone(), Vec::new());
-        self.pressure = term.map(|term| Pressed { term, step, share, dead, force });
+        self.following = loads.map(|loads| Followed { loads, share, dead, force });
         self
     }
 
-    /// Force of the pressures in the last evaluation, owned nodes; empty without any.
-    pub fn pressure_force(&self) -> &[f64] {
-        self.pressure.as_ref().map_or(&[], |pressed| &pressed.force)
+    /// Those of the last evaluation, owned nodes; empty without any.
+    pub fn following_force(&self) -> &[f64] {
+        self.following.as_ref().map_or(&[], |followed| &followed.force)
     }
 
     /// Acts on the matrix as multigrid reads it.
@@ -316,14 +310,14 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self.tangent = Tangent::Stale;
         let (world, pattern, terms) = (self.world, self.pattern, &self.terms);
         let at = At { pattern, displacement: &self.displacement };
-        let pressure = self.pressure.as_ref();
-        let mut pressed = vec![0.0; pressure.map_or(0, |_| numbering.len() * D)];
+        let following = self.following.as_ref();
+        let mut pushed = vec![0.0; following.map_or(0, |_| numbering.len() * D)];
         let mut add = |part: Part, force: &mut [f64], mut rows: Option<&mut InPlace<'_, D>>| {
             let health = terms.iter().fold(Health::default(), |health, term| {
                 health.and(term.add_shares(part, at, force, rows.as_deref_mut()))
             });
-            if let Some(all) = pressure {
-                all.term.add_shares(all.step, part, at, &mut pressed, rows);
+            if let Some(all) = following {
+                all.loads.add_shares(part, at, &mut pushed, rows);
             }
             health
         };
@@ -352,8 +346,8 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             term.add_force(at, &mut force);
         }
         self.internal_owned = force;
-        if let Some(all) = &mut self.pressure {
-            all.join(world, numbering, pressed, &mut self.external_owned)?;
+        if let Some(all) = &mut self.following {
+            all.join(world, numbering, pushed, &mut self.external_owned)?;
         }
         let Some(mut rows) = rows else { return Ok(true) };
         for term in terms {

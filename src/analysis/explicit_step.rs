@@ -8,7 +8,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
-use crate::system::terms::pressure::PressureTerm;
+use crate::system::terms::following::Following;
 use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 
@@ -19,7 +19,7 @@ use crate::mass::solver::MassSolver;
 use crate::points::Snapshot;
 use crate::record::context::Run;
 use crate::record::ledger::StepSums;
-use crate::record::reactions::{at_held, reactions};
+use crate::record::reactions::{at_held, reactions, supports_at_start, with_supports};
 use crate::record::step::{Solved, grid_side};
 use crate::system::model::Model;
 use crate::system::step_system::{Coupling, Discretisation};
@@ -61,12 +61,11 @@ pub(crate) fn advance<const D: usize>(
         let light = LightNodes::find(world, &mesh, step, grid.cell_size(), &mut mass)?;
         Ok((mass, light))
     })?;
-    let pressed = match PressureTerm::new(model, span.factor_start, span.time_start) {
-        Some(term) => {
-            term.owned_at_start(world, &mesh, mesh.step_points(points, &model.materials))?
-        }
+    let pressed = match Following::new(model, &mesh, points, span.factor_start, span.time_start) {
+        Some(following) => following.owned_at_start(world, &mesh)?,
         None => Vec::new(),
     };
+    let borne = supports_at_start(model, &mesh, points, span);
     let inertia = (&mass, light, solver);
     let mut nodes = Nodes::new(world, model, &mesh, &conditions, inertia, &external, dt)?;
     nodes.pressed = &pressed;
@@ -138,7 +137,11 @@ pub(crate) fn advance<const D: usize>(
         time: span.time_end,
         dt,
         linear_iterations,
-        reactions: reactions(world, grid, &mesh, points, &deck.boundaries, &conditions, &residual),
+        reactions: with_supports(
+            world,
+            &borne,
+            reactions(world, grid, &mesh, points, &deck.boundaries, &conditions, &residual),
+        ),
         ..grid_side(world, &mesh, points)
     };
     let driven = mass.driven_energy(&mesh, &conditions.increment, dt);

@@ -6,18 +6,19 @@ use crate::points::Points;
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
-use crate::system::terms::pressure::PressureTerm;
+use crate::system::terms::following::Following;
 use crate::transfer::mapping;
 
 /// External forces of a step, N.
 pub(super) struct Loads<const D: usize> {
     /// On the points at the start.
     pub points_start: Vec<[f64; D]>,
-    /// This rank's share of the pressures at the start, at the local nodes; empty without any.
+    /// This rank's share of the forces that follow the motion at the start, at the local nodes; empty
+    /// without any.
     pub pressed_start: Vec<f64>,
-    /// Of the owned degrees of freedom, here and below, with the pressures.
+    /// Of the owned degrees of freedom, here and below, with those that follow the motion.
     pub external_start: Vec<f64>,
-    /// The pressures at the end are known once the step is solved.
+    /// Those at the end are known once the step is solved.
     pub external_end: Vec<f64>,
 }
 
@@ -34,9 +35,9 @@ impl<const D: usize> Loads<D> {
         let points_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
         let mut external_start = owned_forces(world, mesh, &points_start)?;
         let mut pressed_start = Vec::new();
-        if let Some(term) = PressureTerm::new(model, span.factor_start, span.time_start) {
-            let step = mesh.step_points(points, &model.materials);
-            pressed_start = term.at_start(step, &mesh.pattern, mesh.numbering.len());
+        let following = Following::new(model, mesh, points, span.factor_start, span.time_start);
+        if let Some(following) = following {
+            pressed_start = following.at_start(&mesh.pattern, mesh.numbering.len());
             let mut owned = pressed_start.clone();
             mesh.numbering.halo.reverse_add(world, &mut owned, D)?;
             add(&mut external_start, 1.0, &owned);

@@ -10,11 +10,12 @@ use crate::output::tables::history::HistoryRow;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::record::context::Run;
-use crate::record::reactions::{at_held, reactions};
+use crate::record::reactions::{at_held, reactions, supports, supports_at_start, with_supports};
 use crate::record::step::{Moment, Solved, grid_side};
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 use crate::system::step_system::{Coupling, Discretisation};
+use crate::system::terms::surface::Borne;
 use crate::transfer::refusal::Halt;
 use crate::transfer::update;
 
@@ -117,10 +118,11 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         let equations =
             StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
         let solved = newton::solve(run, &mesh, equations, &mut self.trials, next)?;
-        add(&mut loads.external_end, 1.0, &solved.pressure);
-        add(&mut driving, share, &solved.pressure);
+        add(&mut loads.external_end, 1.0, &solved.following);
+        add(&mut driving, share, &solved.following);
         let displacement = solved.displacement;
 
+        let borne = supports_in_step(run, &mesh, span, &displacement, inertial.as_ref());
         let Run { world, model, points, clock, .. } = &mut *run;
         let carry = || Ok(newton::carried(world, model, &mesh, points, &displacement, span));
         let Carried { made, moved_grid } = clock.time(Phase::Update, carry)??;
@@ -163,14 +165,18 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             newton_iterations: solved.evaluations,
             residual: solved.residual,
             linear_iterations: solved.linear_iterations,
-            reactions: reactions(
+            reactions: with_supports(
                 world,
-                &model.grid,
-                &mesh,
-                points,
-                &model.deck.boundaries,
-                conditions,
-                &supplied,
+                &borne,
+                reactions(
+                    world,
+                    &model.grid,
+                    &mesh,
+                    points,
+                    &model.deck.boundaries,
+                    conditions,
+                    &supplied,
+                ),
             ),
             ..grid_side(world, &mesh, points)
         };
@@ -208,6 +214,25 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
 
     fn completed(&self) -> usize {
         self.stepping.completed()
+    }
+}
+
+/// What the supports bear: at the end of the step, in dynamics in its mean, as the other reactions.
+fn supports_in_step<const D: usize>(
+    run: &Run<D>,
+    mesh: &Discretisation<D>,
+    span: StepSpan,
+    displacement: &[f64],
+    inertial: Option<&InertialStep>,
+) -> Vec<Borne> {
+    let Run { model, points, .. } = run;
+    let end = supports(model, mesh, points, (span.factor_end, span.time_end), displacement);
+    match inertial.map(InertialStep::share_of_start) {
+        Some(share) if share > 0.0 => {
+            let start = supports_at_start(model, mesh, points, span);
+            end.iter().zip(&start).map(|(end, start)| end.mixed(start, share)).collect()
+        }
+        _ => end,
     }
 }
 

@@ -177,6 +177,12 @@ impl InertialStep {
         (supplied, [at_start, at_end])
     }
 
+    /// What forces at the start count for in the mean of the step.
+    pub fn share_of_start(&self) -> f64 {
+        let newmark = &self.newmark;
+        if newmark.alpha == 0.0 { newmark.mean(&[1.0], &[0.0])[0] } else { 0.0 }
+    }
+
     /// Nodal rates at the end of a step with the nodal increments `displacement`.
     pub fn rates_at_end(&self, displacement: &[f64]) -> Rates {
         self.newmark.rates(&self.start, displacement)

@@ -10,7 +10,7 @@ use crate::petsc::snes::NewtonOutcome;
 use crate::petsc::{Matrix, Vector};
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
-use crate::system::terms::pressure::PressureTerm;
+use crate::system::terms::following::Following;
 
 use super::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use super::solver::{self, Linear, Trials};
@@ -30,8 +30,8 @@ pub struct Converged {
     pub internal: Vec<f64>,
     /// The same at zero displacement.
     pub internal_start: Vec<f64>,
-    /// Force of the pressures at the end, N; empty without any.
-    pub pressure: Vec<f64>,
+    /// Forces at the end that follow the motion, N; empty without any.
+    pub following: Vec<f64>,
     /// u K_G u / 2 over all ranks, J.
     pub ghost_energy: f64,
     /// Normalised residual at the end.
@@ -64,9 +64,9 @@ pub fn solve<const D: usize>(
     let numbering = &mesh.numbering;
     let step = mesh.step_points(points, &model.materials);
     let mut problem = clock.time(Phase::Assemble, || {
-        let pressure = PressureTerm::new(model, span.factor_end, span.time_end);
+        let following = Following::new(model, mesh, points, span.factor_end, span.time_end);
         let problem = Equilibrium::new(world, &model.grid, mesh, step, equations, settings(model));
-        Ok(problem?.with_pressure(pressure, step, 1.0 + model.deck.analysis.hht_alpha))
+        Ok(problem?.with_following(following, 1.0 + model.deck.analysis.hht_alpha))
     })?;
     let mut matrix =
         clock.time(Phase::Assemble, || solver::matrix(world, model, numbering, &mesh.pattern))?;
@@ -109,7 +109,7 @@ pub fn solve<const D: usize>(
         displacement: problem.displacement().to_vec(),
         internal: problem.internal_force().to_vec(),
         internal_start: problem.internal_force_at_start().to_vec(),
-        pressure: problem.pressure_force().to_vec(),
+        following: problem.following_force().to_vec(),
         ghost_energy: world.sum(problem.ghost_energy()),
         residual,
         evaluations: problem.errors.len(),

@@ -15,8 +15,10 @@ use crate::parallel::World;
 use crate::points::Points;
 use crate::record::context::Run;
 use crate::record::ledger::{Entry, Ledger, StepSums};
+use crate::surface::norm;
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
+use crate::system::supports::Support;
 use crate::transfer::update;
 
 /// Where a run stands in time.
@@ -123,8 +125,23 @@ pub fn stability_limit<const D: usize>(
             local(&model.materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
         let wave = modulus * points.volume(p) / points.mass[p];
         let speed = points.velocity[p].iter().map(|v| v * v).sum::<f64>().sqrt();
-        rate = rate.max(wave.abs().sqrt() * factor + speed);
+        let held = 0.25 * h * h * held_frequency(model, points, p);
+        rate = rate.max((wave.abs() + held).sqrt() * factor + speed);
         wave_energy += points.mass[p] * wave.abs();
     }
     (h / world.max(rate), world.sum(wave_energy))
+}
+
+/// Square of the highest frequency, 1/s2, that the penalties on surfaces give the mass of a point that
+/// carries their elements: Σ β A Σ_a w_a^2 / (m S_a), of which the sum over nodes is about one where w is
+/// S, and larger where the surface lies beyond the point.
+fn held_frequency<const D: usize>(model: &Model<D>, points: &Points<D>, p: usize) -> f64 {
+    /// Measured on columns whose ends lie at all places of a cell.
+    const BEYOND: f64 = 2.0;
+    let of_support = |support: &Support<D>| {
+        let own = support.surface.carried_by(points.id[p]);
+        let area: f64 = own.iter().map(|own| norm(&own.element.area)).sum();
+        support.penalty * model.stiffness[points.body[p] as usize] * area
+    };
+    BEYOND * model.supports.iter().map(of_support).sum::<f64>() / points.mass[p]
 }

@@ -43,6 +43,27 @@ pub struct Deck {
     pub places: Places,
 }
 
+impl Boundary {
+    /// How it holds a surface off the grid's nodes, if it does.
+    pub fn support(&self) -> Option<&Support> {
+        match &self.place {
+            Place::Surface(support) => Some(support),
+            _ => None,
+        }
+    }
+
+    /// Whether it may hold a motion along an axis.
+    pub fn may_hold(&self, axis: usize) -> bool {
+        let of_surface = self.support().is_some_and(|support| {
+            support.slip || (self.fix.is_empty() && self.displacement.is_empty())
+        });
+        of_surface
+            || self.fix.contains(&axis)
+            || self.displacement.iter().any(|(component, _)| *component == axis)
+            || (self.rotation.is_some() && axis < 2)
+    }
+}
+
 impl Deck {
     /// The files that the deck names: points of bodies, the mesh.
     pub fn files(&self) -> Vec<PathBuf> {
@@ -469,6 +490,39 @@ pub enum Place {
     /// All nodes of the cells that hold the outermost points of a body (Lagrangian §7.2),
     /// recomputed every step.
     CellsOf { body: usize },
+    /// No nodes: a surface that a penalty holds, wherever it lies on the grid.
+    Surface(Support),
+}
+
+/// A surface that is held off the grid's nodes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Support {
+    pub surface: Held,
+    /// Its normal component alone is held.
+    pub slip: bool,
+    /// Force per area and per distance, times h over the body's stiffness.
+    pub penalty: f64,
+}
+
+/// What a [`Support`] holds.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Held {
+    /// A part of a body's own surface.
+    Surface(BodySurface),
+    /// The material on a line between two places (2D), or on a parallelogram given by three of its
+    /// corners, the first between the others (3D), at the start, m.
+    Sheet(Vec<Vec<f64>>),
+}
+
+/// A part of the surface of a body that is given as a shape, at the start.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodySurface {
+    pub body: usize,
+    /// Axis and whether it is the upper end: where the outward normal, in the frame of the shape, is
+    /// nearest to this direction. `None`: everywhere.
+    pub side: Option<(usize, bool)>,
+    /// Condition on x, y, z at the start; `None`: everywhere.
+    pub within: Option<Expression>,
 }
 
 /// In quasi-static runs values that hold neither `s` nor `t` are ramped with the load factor.
@@ -483,8 +537,10 @@ pub enum Load {
     BodyForce(Vec<Expression>),
     /// Pa, an expression of x, y, z, s, t: a pressure on the surface of all bodies.
     Pressure { value: Expression, zone: Option<PressureZone> },
-    /// Pa per initial area, expressions of X, Y, Z, s, t: a traction on a side of a body.
-    Traction { side: BodySide, value: Vec<Expression> },
+    /// Pa, an expression of x, y, z, s, t: a pressure on a body's own surface.
+    SurfacePressure { surface: BodySurface, value: Expression },
+    /// Pa per initial area, expressions of X, Y, Z, s, t: a traction on a body's own surface.
+    Traction { surface: BodySurface, value: Vec<Expression> },
     /// Body force (N per initial volume) that makes this displacement field exact: one expression
     /// per axis of X, Y, Z, s (manufactured solution).
     Manufactured(Vec<Expression>),
@@ -499,18 +555,6 @@ impl Load {
             _ => false,
         }
     }
-}
-
-/// A side of a body that is a box along the axes, at the start.
-#[derive(Debug, Clone, PartialEq)]
-pub struct BodySide {
-    pub body: usize,
-    pub axis: usize,
-    pub upper: bool,
-    /// Its place along the axis, m.
-    pub at: f64,
-    /// m2 (m in 2D)
-    pub area: f64,
 }
 
 /// Where a pressure acts in full, in current positions.

@@ -74,7 +74,7 @@ fn may_be_extended(deck: &Deck) -> bool {
         .iter()
         .any(|boundary| boundary.rotation.is_some() || boundary.displacement.iter().any(total));
     let load_totals = deck.loads.iter().any(|load| match load {
-        Load::Pressure { value, .. } => of_factor(value),
+        Load::Pressure { value, .. } | Load::SurfacePressure { value, .. } => of_factor(value),
         Load::Point { force: all, .. }
         | Load::Gravity(all)
         | Load::Traction { value: all, .. }

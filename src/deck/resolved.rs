@@ -2,8 +2,8 @@
 
 use super::expression::Expression;
 use super::model::{
-    BodySource, Deck, ElementTest, Every, Grid, Load, Material, MeshMotion, MeshSource, Place,
-    Seeding, Spot,
+    BodySource, BodySurface, Boundary, Deck, ElementTest, Every, Grid, Held, Load, Material,
+    MeshMotion, MeshSource, Place, Seeding, Spot, Support,
 };
 use super::schema::{self, AXES, SIDES};
 use super::shape::{Form, Shape};
@@ -336,6 +336,10 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
         w.table("[[boundary]]");
         w.line("boundary", "name", quote(&boundary.name));
         let place = match &boundary.place {
+            Place::Surface(support) => {
+                supported(w, deck, boundary, support);
+                continue;
+            }
             Place::Side { axis, upper } => ("side", quote(SIDES[2 * axis + usize::from(*upper)])),
             Place::Box { min, max } => {
                 ("box", inline(&[("min", vector(min)), ("max", vector(max))]))
@@ -345,14 +349,7 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
         };
         w.line("boundary", "where", inline(&[place]));
         w.line("boundary", "fix", axes(&boundary.fix));
-        if !boundary.displacement.is_empty() {
-            let pairs: Vec<(&str, String)> = boundary
-                .displacement
-                .iter()
-                .map(|(axis, e)| (AXES[*axis], expression(e)))
-                .collect();
-            w.line("boundary", "displacement", inline(&pairs));
-        }
+        displaced(w, boundary);
         if let Some(rotation) = &boundary.rotation {
             let pairs =
                 [("centre", vector(&rotation.centre)), ("degrees", number(rotation.degrees))];
@@ -372,13 +369,15 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
             }
             Load::Gravity(gravity) => w.line("load", "gravity", expressions(gravity)),
             Load::BodyForce(force) => w.line("load", "body_force", expressions(force)),
-            Load::Traction { side, value } => {
-                let pairs = [
-                    ("body", quote(&deck.bodies[side.body].name)),
-                    ("side", quote(SIDES[2 * side.axis + usize::from(side.upper)])),
-                    ("value", expressions(value)),
-                ];
+            Load::Traction { surface, value } => {
+                let mut pairs = body_surface(deck, surface);
+                pairs.push(("value", expressions(value)));
                 w.line("load", "traction", inline(&pairs));
+            }
+            Load::SurfacePressure { surface, value } => {
+                let surface = inline(&body_surface(deck, surface));
+                let pairs = [("value", expression(value)), ("surface", surface)];
+                w.line("load", "pressure", inline(&pairs));
             }
             Load::Pressure { value, zone } => {
                 let mut pairs = vec![("value", expression(value))];
@@ -393,6 +392,42 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
             Load::Manufactured(field) => w.line("load", "manufactured", expressions(field)),
         }
     }
+}
+
+/// What holds a surface.
+fn supported(w: &mut Writer<'_>, deck: &Deck, boundary: &Boundary, support: &Support) {
+    let surface = match &support.surface {
+        Held::Surface(surface) => body_surface(deck, surface),
+        Held::Sheet(corners) => {
+            let key = if corners.len() == 2 { "line" } else { "plane" };
+            vec![(key, array(corners.iter().map(|x| vector(x))))]
+        }
+    };
+    w.line("boundary", "surface", inline(&surface));
+    if !boundary.fix.is_empty() {
+        w.line("boundary", "fix", axes(&boundary.fix));
+    }
+    displaced(w, boundary);
+    w.line("boundary", "slip", support.slip.to_string());
+    w.line("boundary", "penalty", number(support.penalty));
+}
+
+fn displaced(w: &mut Writer<'_>, boundary: &Boundary) {
+    if boundary.displacement.is_empty() {
+        return;
+    }
+    let pairs: Vec<(&str, String)> =
+        boundary.displacement.iter().map(|(axis, e)| (AXES[*axis], expression(e))).collect();
+    w.line("boundary", "displacement", inline(&pairs));
+}
+
+fn body_surface(deck: &Deck, surface: &BodySurface) -> Vec<(&'static str, String)> {
+    let mut pairs = vec![("body", quote(&deck.bodies[surface.body].name))];
+    if let Some((axis, upper)) = surface.side {
+        pairs.push(("side", quote(SIDES[2 * axis + usize::from(upper)])));
+    }
+    pairs.extend(surface.within.as_ref().map(|within| ("where", quote(within.text()))));
+    pairs
 }
 
 fn results(w: &mut Writer<'_>, deck: &Deck) {

@@ -83,7 +83,8 @@ impl Placement {
         self.translate.is_empty() && self.rotate.is_none()
     }
 
-    fn globalise(&self, x: [f64; 3]) -> [f64; 3] {
+    /// Local to global position, padded with zeros in 2D.
+    pub fn globalise(&self, x: [f64; 3]) -> [f64; 3] {
         let mut x = self.rotate.as_ref().map_or(x, |turn| turn.apply(x, 1.0));
         for (value, shift) in x.iter_mut().zip(&self.translate) {
             *value += shift;
@@ -91,7 +92,8 @@ impl Placement {
         x
     }
 
-    fn localise(&self, mut x: [f64; 3]) -> [f64; 3] {
+    /// Global to local position.
+    pub fn localise(&self, mut x: [f64; 3]) -> [f64; 3] {
         for (value, shift) in x.iter_mut().zip(&self.translate) {
             *value -= shift;
         }
@@ -153,7 +155,8 @@ impl Shape {
         self.placement.localise(padded(x))[..x.len()].to_vec()
     }
 
-    fn contains_padded(&self, x: [f64; 3]) -> bool {
+    /// As [`Shape::contains`], for a position padded with zeros in 2D.
+    pub fn contains_padded(&self, x: [f64; 3]) -> bool {
         let local = if self.placement.is_identity() { x } else { self.placement.localise(x) };
         self.form.contains(local)
     }
@@ -227,7 +230,7 @@ impl Form {
     }
 }
 
-pub(super) fn padded(x: &[f64]) -> [f64; 3] {
+pub fn padded(x: &[f64]) -> [f64; 3] {
     std::array::from_fn(|axis| x.get(axis).copied().unwrap_or(0.0))
 }
 

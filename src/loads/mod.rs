@@ -6,6 +6,7 @@
 //! | `gravity` | [`Gravity`] | `gravity.rs` | Lagrangian eq. 24: S m g |
 //! | `body_force` | [`BodyForce`] | `body_force.rs` | Lagrangian eq. 24: S b V0 |
 //! | `pressure` | [`Pressure`] | `pressure.rs` | Given et al. 2024: virtual stress |
+//! | `pressure.surface` | [`SurfacePressure`] | `surface_pressure.rs` | formulations.md B.6 (b) |
 //! | `traction` | [`Traction`] | `traction.rs` | formulations.md B.6 (b) |
 //! | `manufactured` | [`Manufactured`] | `manufactured.rs` | Lagrangian §7.4 |
 //!
@@ -16,13 +17,15 @@ mod gravity;
 pub mod manufactured;
 mod point;
 pub mod pressure;
-pub mod traction;
+mod surface_pressure;
+mod traction;
 
 pub use body_force::BodyForce;
 pub use gravity::Gravity;
 pub use manufactured::Manufactured;
 pub use point::{Carriers, PointForce};
 pub use pressure::Pressure;
+pub use surface_pressure::SurfacePressure;
 pub use traction::Traction;
 
 use crate::deck::Scope;
@@ -31,6 +34,7 @@ use crate::deck::model::{self, AnalysisType};
 use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::points::Points;
+use crate::surface::Surface;
 
 /// The moment at which loads are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -60,7 +64,7 @@ impl Moment {
     }
 
     /// One ramped value per axis in `scope`.
-    fn values<const D: usize>(&self, expressions: &[Expression], scope: &Scope) -> [f64; D] {
+    pub fn values<const D: usize>(&self, expressions: &[Expression], scope: &Scope) -> [f64; D] {
         std::array::from_fn(|a| {
             let expression = &expressions[a];
             self.factor_of(expression) * expression.value(scope)
@@ -85,6 +89,11 @@ pub trait Load<const D: usize> {
         None
     }
 
+    /// The surface that the load acts on, for one that acts on a body's own.
+    fn on_surface(&self) -> Option<OnSurface<'_, D>> {
+        None
+    }
+
     /// Whether the tangent of the load equals its transposed. Loads that do not follow the motion
     /// within a step have none.
     fn symmetric(&self) -> bool {
@@ -92,13 +101,22 @@ pub trait Load<const D: usize> {
     }
 }
 
+/// What acts on a body's own surface.
+#[derive(Clone, Copy)]
+pub enum OnSurface<'a, const D: usize> {
+    /// Pa per initial area, one expression of X, Y, Z, s, t per axis.
+    Traction { surface: &'a Surface<D>, value: &'a [Expression] },
+    /// Against the current normal.
+    Pressure { surface: &'a Surface<D>, pressure: &'a Pressure },
+}
+
 /// What the start of a run tells of a load.
 #[derive(Debug, Clone, Default)]
-pub struct Found {
+pub struct Found<const D: usize> {
     /// Who carries a point force that is a function.
     pub carriers: Carriers,
-    /// Initial volume of the points that carry a traction, m3.
-    pub volume: f64,
+    /// The surface that it acts on, if it acts on one.
+    pub surface: Surface<D>,
 }
 
 /// What the deck asks for, in its order, with what was `found` of each;
@@ -106,7 +124,7 @@ pub struct Found {
 /// Error: a formula cannot serve.
 pub fn of_deck<const D: usize>(
     loads: &[model::Load],
-    found: &[Found],
+    found: Vec<Found<D>>,
     cell: f64,
 ) -> Result<Vec<Box<dyn Load<D>>>> {
     let made = loads.iter().zip(found).map(|(load, found)| -> Result<Box<dyn Load<D>>> {
@@ -114,9 +132,13 @@ pub fn of_deck<const D: usize>(
             model::Load::Point { force, .. } => Box::new(PointForce::new(force, &found.carriers)),
             model::Load::Gravity(gravity) => Box::new(Gravity(gravity.clone())),
             model::Load::BodyForce(force) => Box::new(BodyForce(force.clone())),
-            model::Load::Traction { side, value } => {
-                Box::new(Traction::new(side, value, found.volume))
+            model::Load::Traction { value, .. } => {
+                Box::new(Traction { surface: found.surface, value: value.clone() })
             }
+            model::Load::SurfacePressure { value, .. } => Box::new(SurfacePressure {
+                surface: found.surface,
+                pressure: Pressure::new(value, None, cell)?,
+            }),
             model::Load::Pressure { value, zone } => {
                 Box::new(Pressure::new(value, zone.as_ref(), cell)?)
             }

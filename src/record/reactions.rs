@@ -6,8 +6,10 @@ use crate::grid::Grid;
 use crate::output::tables::history::Reaction;
 use crate::parallel::World;
 use crate::points::Points;
-use crate::system::conditions::Conditions;
+use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
+use crate::system::terms::surface::{Borne, SurfaceTerm};
 
 /// Sums what each boundary supplies over the degrees of freedom that follow it
 /// ([`Conditions::members`]); `supplied`: f_int - f_ext of the owned ones, N. The torque is about the
@@ -58,6 +60,58 @@ pub fn reactions<const D: usize>(
             }
         })
         .collect()
+}
+
+/// What the supports bear at the start of a step, this rank's share; empty without any.
+pub fn supports_at_start<const D: usize>(
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    span: StepSpan,
+) -> Vec<Borne> {
+    let still = match model.supports.is_empty() {
+        true => Vec::new(),
+        false => vec![0.0; mesh.numbering.len() * D],
+    };
+    supports(model, mesh, points, (span.factor_start, span.time_start), &still)
+}
+
+/// What they bear after the nodal increments `displacement` (local nodes, m) of a step whose points
+/// have not been updated; `at`: load factor and time, s.
+pub fn supports<const D: usize>(
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    at: (f64, f64),
+    displacement: &[f64],
+) -> Vec<Borne> {
+    if model.supports.is_empty() {
+        return Vec::new();
+    }
+    let step = mesh.step_points(points, &model.materials);
+    let count = model.deck.boundaries.len();
+    let term = SurfaceTerm::new(model, step, &mesh.carriers, at.0, at.1);
+    term.map_or(Vec::new(), |term| term.borne(step, displacement, count))
+}
+
+/// Adds what supports bear over all ranks to the reactions of the deck's boundaries. Collective.
+pub fn with_supports(
+    world: &World,
+    borne: &[Borne],
+    mut reactions: Vec<Reaction>,
+) -> Vec<Reaction> {
+    if borne.is_empty() {
+        return reactions;
+    }
+    let of_one = |b: &Borne| [b.force[0], b.force[1], b.force[2], b.sum_abs, b.torque, b.held];
+    let sums = world.sum_slice(&borne.iter().flat_map(of_one).collect::<Vec<_>>());
+    for (reaction, sums) in reactions.iter_mut().zip(sums.chunks_exact(6)) {
+        reaction.force.iter_mut().zip(sums).for_each(|(force, sum)| *force += sum);
+        reaction.sum_abs += sums[3];
+        reaction.torque += sums[4];
+        reaction.held += sums[5];
+    }
+    reactions
 }
 
 /// Σ_p V_p Σ_v S_vp over the nodes v that each boundary holds, this rank's points, m3.

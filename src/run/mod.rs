@@ -6,6 +6,7 @@
 //! | a run of one point, without a grid | `element_run.rs` |
 //! | deck to points on their ranks | `setup.rs` |
 //! | parameters and state of the points' materials | `materials.rs` |
+//! | surfaces and the points that carry them | `surfaces.rs` |
 //! | what is checked before anything is written | `start_checks/` |
 //! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs`, `locking.rs` |
 //! | the process that MPI starts | `process.rs` |
@@ -19,3 +20,4 @@ pub mod process;
 pub mod session;
 pub mod setup;
 pub mod start_checks;
+mod surfaces;

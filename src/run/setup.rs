@@ -7,7 +7,7 @@ use crate::deck::{Deck, rough};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
-use crate::loads::{self, Found, Manufactured, traction};
+use crate::loads::{self, Found, Manufactured};
 use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
 use crate::parallel::nearest::nearest_point;
@@ -19,6 +19,7 @@ use crate::points::share::Share;
 
 use super::materials::{self, Overview};
 use super::start_checks::memory;
+use super::surfaces;
 use crate::parallel::balance::Balance;
 use crate::system::model::Model;
 
@@ -82,7 +83,7 @@ fn model_of<const D: usize>(
     grid: Grid<D>,
     partition: Partition<D>,
     materials: Vec<Material>,
-    found: Vec<Found>,
+    found: Vec<Found<D>>,
     points: &Points<D>,
 ) -> Result<Model<D>> {
     let Overview { stiffness, symmetric } = Overview::of(world, &deck, &materials, points);
@@ -101,7 +102,8 @@ fn model_of<const D: usize>(
         _ => None,
     });
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
-    let loads = loads::of_deck(&deck.loads, &found, grid.cell_size())?;
+    let loads = loads::of_deck(&deck.loads, found, grid.cell_size())?;
+    let supports = surfaces::supports(world, &deck, points, grid.cell_size())?;
     let symmetric = symmetric && loads.iter().all(|load| load.symmetric());
     let balance = Balance::default();
     Ok(Model {
@@ -113,6 +115,7 @@ fn model_of<const D: usize>(
         stiffness,
         symmetric,
         loads,
+        supports,
         manufactured,
         balance,
     })
@@ -206,20 +209,15 @@ fn find_carriers<const D: usize>(
     deck: &Deck,
     grid: &Grid<D>,
     points: &Points<D>,
-) -> Result<Vec<Found>> {
+) -> Result<Vec<Found<D>>> {
     let mut all = vec![Found::default(); deck.loads.len()];
     for (index, load) in deck.loads.iter().enumerate() {
-        if let Load::Traction { side, .. } = load {
-            let layer = (0..points.len()).filter(|&p| traction::carries(side, points, p));
-            all[index].volume = world.sum(layer.map(|p| points.volume_initial[p]).sum());
-            if all[index].volume == 0.0 {
-                let why = format!(
-                    "no point of body \"{}\" has its domain at this side",
-                    deck.bodies[side.body].name
-                );
-                let key = format!("load.{index}.traction.side");
-                return Err(Error::Input(deck.places.say(&key, &why)));
-            }
+        if let Load::Traction { surface, .. } | Load::SurfacePressure { surface, .. } = load {
+            let key = match load {
+                Load::Traction { .. } => format!("load.{index}.traction"),
+                _ => format!("load.{index}.pressure.surface"),
+            };
+            all[index].surface = surfaces::of_body(world, deck, points, surface, &key)?;
         }
         let Load::Point { body, nearest, .. } = load else { continue };
         for place in nearest {
@@ -251,7 +249,11 @@ fn find_carriers<const D: usize>(
 }
 
 /// Gives point forces that hold neither s nor t to the points that carry them, and to them alone.
-fn hold_constant_forces<const D: usize>(deck: &Deck, found: &mut [Found], points: &mut Points<D>) {
+fn hold_constant_forces<const D: usize>(
+    deck: &Deck,
+    found: &mut [Found<D>],
+    points: &mut Points<D>,
+) {
     for (load, found) in deck.loads.iter().zip(found) {
         let Load::Point { nearest, force, .. } = load else { continue };
         if force.iter().any(Expression::depends_on_time) {

@@ -133,6 +133,7 @@ fn members<const D: usize>(
     place: &Place,
 ) -> Result<Vec<bool>> {
     match place {
+        Place::Surface(_) => Ok(vec![false; numbering.len()]),
         Place::CellsOf { body } => cells_of(world, grid, basis, numbering, points, *body),
         Place::Side { axis, upper } => {
             Ok(numbering.nodes.iter().map(|&node| grid.on_side(node, *axis, *upper)).collect())

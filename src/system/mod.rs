@@ -18,6 +18,7 @@
 //! | `in_place.rs` | those rows in the solver's own memory |
 //! | `held.rs` | held degrees of freedom in those rows |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
+//! | `supports.rs` | surfaces held by a penalty, wherever they lie on the grid |
 //! | `face_points.rs` | the cells of points on faces, where the mass decides |
 //! | `terms/` | contributions to the equations |
 
@@ -37,4 +38,5 @@ pub mod plain;
 pub mod populated;
 pub mod scatter;
 pub mod step_system;
+pub mod supports;
 pub mod terms;

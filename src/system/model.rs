@@ -11,6 +11,8 @@ use crate::parallel::balance::Balance;
 use crate::parallel::{Partition, World};
 use crate::points::Points;
 
+use super::supports::Support;
+
 /// What stays the same while points move: the deck made computable.
 pub struct Model<const D: usize> {
     pub deck: Deck,
@@ -26,6 +28,8 @@ pub struct Model<const D: usize> {
     pub symmetric: bool,
     /// In the order of the deck.
     pub loads: Vec<Box<dyn Load<D>>>,
+    /// Surfaces that are held off the grid's nodes.
+    pub supports: Vec<Support<D>>,
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
     pub balance: Balance,
@@ -35,6 +39,11 @@ impl<const D: usize> Model<D> {
     /// Whether every body has Ghost stiffness.
     pub fn stabilised(&self) -> bool {
         self.penalties.iter().all(|penalty| penalty.stiffness > 0.0)
+    }
+
+    /// Whether anything acts on a body's own surface.
+    pub fn acts_on_surfaces(&self) -> bool {
+        !self.supports.is_empty() || self.loads.iter().any(|load| load.on_surface().is_some())
     }
 
     /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the

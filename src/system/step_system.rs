@@ -9,6 +9,7 @@ use super::numbering::Touched;
 use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
+use super::terms::surface;
 use crate::basis::{self, Groups, Influences};
 use crate::deck::model::{Basis, Locking, PointVolume};
 use crate::error::Result;
@@ -40,6 +41,8 @@ pub struct Discretisation<const D: usize> {
     pub on_face: Vec<bool>,
     /// Cells of the faces owned here.
     pub ghost_cells: Vec<usize>,
+    /// Points that carry elements of surfaces on which something acts.
+    pub carriers: Vec<usize>,
     /// What stresses are integrated over.
     pub point_volume: PointVolume,
 }
@@ -180,6 +183,7 @@ impl<const D: usize> Discretisation<D> {
             node_grip,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
+            carriers: surface::carriers(model, points),
             point_volume: model.deck.method.point_volume,
         })
     }

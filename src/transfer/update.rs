@@ -151,7 +151,7 @@ fn way_out<const D: usize>(grid: &Grid<D>, boundaries: &[Boundary], place: &[f64
             Place::Side { axis: a, upper: u } => (*a, *u) == (axis, upper),
             Place::Box { min, max } => min[axis] <= end && end <= max[axis],
             Place::Tag(_) => matches!(grid, Grid::Mesh(_)),
-            Place::CellsOf { .. } => false,
+            Place::CellsOf { .. } | Place::Surface(_) => false,
         };
         let moves = boundary.displacement.iter().any(|(component, _)| *component == axis);
         there && (moves || boundary.fix.contains(&axis) || boundary.rotation.is_some())

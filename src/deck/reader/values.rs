@@ -70,6 +70,13 @@ impl Table<'_> {
         self.present(name, self.count_if(name))
     }
 
+    pub fn flag_if(&self, name: &str) -> Got<Option<bool>> {
+        self.read(name, |key, node| match node.value {
+            Value::Boolean(value) => Ok(value),
+            _ => Err(self.mismatch(key, node)),
+        })
+    }
+
     pub fn text_if(&self, name: &str) -> Got<Option<String>> {
         let text = self.read(name, |key, node| self.text_in(key, node))?;
         // Names go into headers of tables and into messages, which have one line.

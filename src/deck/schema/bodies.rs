@@ -1,12 +1,14 @@
 //! Keys of what is analysed: bodies, shapes, boundaries and loads.
 
 use super::Kind::{
-    Choice, Choices, Count, CountOrCounts, Expression, Expressions, Number, Points, Special, Table,
-    Text, Vector,
+    Choice, Choices, Count, CountOrCounts, Expression, Expressions, Flag, Number, Points, Special,
+    Table, Text, Vector,
 };
 use super::Need::{Default, Optional, Required};
 use super::{AXES, POSITIVE, Section, at_least, between, key};
 
+const SIDE: &str = "The part whose outward normal, in the frame of the shape before rotate, is nearest to this direction: a box's own side, a quarter of a disc.";
+const WITHIN: &str = "Condition on x, y, z at the start, such as \"x*x + y*y < 2\".";
 const SHAPES: &str = "an array of shapes";
 const BALL_KEYS: &[super::Key] = &[
     key("centre", Vector, Required, "Centre.").unit("m"),
@@ -117,15 +119,36 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "boundary",
         header: "[[boundary]]",
-        doc: "Prescribed displacement of grid nodes: at least one of fix, displacement and rotation.",
+        doc: "Prescribed displacement: of grid nodes (where), at least one of fix, displacement and rotation; or of a surface, wherever it lies on the grid (surface).",
         keys: &[
             key("name", Text, Optional("boundary-1, boundary-2, ..."),
                 "Names the reaction columns, unique. A component of a node that several boundaries hold counts for the one whose motion the node follows, of equal ones for the first in the deck."),
-            key("where", Table("where"), Required, "Which nodes."),
+            key("where", Table("where"), Optional("or surface"), "Which nodes."),
+            key("surface", Table("surface"), Optional("or where"),
+                "A surface that is held by a penalty: in all components, in those of fix and displacement if there are any, or with slip in its normal one.")
+                .read_by(&[super::LOADED]),
             key("fix", Choices(&AXES), Optional("none"), "Components held at zero."),
             key("displacement", Table("displacement"), Optional("none"), "Prescribed components."),
             key("rotation", Table("rotation"), Optional("none"),
-                "Rigid rotation: prescribes x and y. In 3D z is free unless fix or displacement prescribe it."),
+                "Rigid rotation: prescribes x and y. In 3D z is free unless fix or displacement prescribe it. Not with surface."),
+            key("slip", Flag, Optional("false; only with surface"),
+                "Holds the component along the normal that the surface has at the start, and lets the material slide along it: exact on a plane. With displacement its normal component is prescribed.")
+                .read_by(&[super::LOADED]),
+            key("penalty", Number, Optional("100; only with surface"),
+                "Force per area and per distance times the cell size over the body's stiffness: the surface gives way by p h / (penalty E) under the pressure p. In explicit runs it shortens the stable time step.")
+                .range(POSITIVE).read_by(&[super::LOADED]),
+        ],
+    },
+    Section {
+        name: "surface",
+        header: "boundary.surface",
+        doc: "A part of a body's own surface, which moves with it and is held where it was at the start; or the material that lies on a line (2D) or plane (3D) at the start. With slip, what has slid beyond the ends of a line or plane is free, and what has slid onto it is held.",
+        keys: &[
+            key("body", Text, Optional("the only body"), "Name of a body given as a shape."),
+            key("side", Choice(SIDES), Optional("the whole surface"), SIDE),
+            key("where", Text, Optional("everywhere"), WITHIN),
+            key("line", Points, Optional("-"), "Two ends (2D).").unit("m"),
+            key("plane", Points, Optional("-"), "Three corners of a parallelogram, the first between the others (3D).").unit("m"),
         ],
     },
     Section {
@@ -182,7 +205,7 @@ pub const SECTIONS: &[Section] = &[
             key("pressure", Table("load.pressure"), Optional("-"),
                 "Pressure on the surface of all bodies, in the current state."),
             key("traction", Table("load.traction"), Optional("-"),
-                "Dead load per initial area on a side of a body."),
+                "Dead load per initial area on a body's surface."),
             key("manufactured", Expressions("X Y Z s"), Optional("-"),
                 "The body force that makes this displacement field exact.").unit("m"),
         ],
@@ -190,11 +213,22 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "load.traction",
         header: "load.traction",
-        doc: "Keeps its direction and its total, whatever the body does. The body's outermost points at the side carry it, each by its share of the area: half a point's domain below the surface, so that stresses in the outermost cells are not those of a surface load.",
+        doc: "Keeps its direction and its total, whatever the body does. It acts on the body's own surface: at places of its shape, which the points beside them carry along.",
         keys: &[
-            key("body", Text, Optional("the only body"), "Name of a body whose shape is a box along the axes."),
-            key("side", Choice(SIDES), Required, "Its side at the start."),
+            key("body", Text, Optional("the only body"), "Name of a body given as a shape."),
+            key("side", Choice(SIDES), Optional("the whole surface"), SIDE),
+            key("where", Text, Optional("everywhere"), WITHIN),
             key("value", Expressions("X Y Z s t"), Required, "Force per initial area.").unit("Pa"),
+        ],
+    },
+    Section {
+        name: "load.surface",
+        header: "load.pressure.surface",
+        doc: "A part of a body's own surface, at the start.",
+        keys: &[
+            key("body", Text, Optional("the only body"), "Name of a body given as a shape."),
+            key("side", Choice(SIDES), Optional("the whole surface"), SIDE),
+            key("where", Text, Optional("everywhere"), WITHIN),
         ],
     },
     Section {
@@ -205,6 +239,8 @@ pub const SECTIONS: &[Section] = &[
             key("value", Expression("x y z s t"), Required, "Compression positive; a formula has derivatives (no `if`, no comparisons).").unit("Pa"),
             key("where", Table("load.pressure.where"), Optional("everywhere"),
                 "A part of the surfaces."),
+            key("surface", Table("load.surface"), Optional("-"),
+                "The body's own surface, or a part of it: the pressure then acts at places of its shape, carried by the points beside them, and not by virtual stress. Its area and normal follow the deformation."),
         ],
     },
     Section {

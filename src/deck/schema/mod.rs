@@ -27,6 +27,8 @@ pub enum Kind {
     Number,
     /// A whole number.
     Count,
+    /// true or false.
+    Flag,
     Choice(&'static [&'static str]),
     /// A list of some of these words.
     Choices(&'static [&'static str]),
@@ -60,6 +62,7 @@ impl Kind {
             Kind::Text => "a string".into(),
             Kind::Number => "a number".into(),
             Kind::Count => "a whole number".into(),
+            Kind::Flag => "true or false".into(),
             Kind::Choice(words) => format!("one of {}", quoted(words)),
             Kind::Choices(words) => format!("an array of {}", quoted(words)),
             Kind::Expression(variables) => {

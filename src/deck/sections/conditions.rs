@@ -1,18 +1,25 @@
 //! `[[boundary]]` and `[[load]]`.
 
 use super::bodies::{self, World};
-use super::shapes;
+use super::{shapes, surfaces};
 use crate::deck::expression::Variable;
 use crate::deck::model::{
-    Body, BodySide, BodySource, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone,
-    Rotation,
+    Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone, Rotation, Support,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, SIDES};
-use crate::deck::shape::Form;
 
-pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got<Vec<Boundary>> {
+/// Penalty factor where the deck says nothing.
+const PENALTY: f64 = 100.0;
+
+/// `bodies`: as written; `read`: as read, if that succeeded.
+pub fn boundaries(
+    root: &Table<'_>,
+    world: &World<'_>,
+    bodies: &[String],
+    read: Option<&[Body]>,
+) -> Got<Vec<Boundary>> {
     let mut names: Vec<String> = Vec::new();
     root.tables("boundary", |index, table| {
         let name = table.text_if("name")?.unwrap_or_else(|| format!("boundary-{}", index + 1));
@@ -21,7 +28,10 @@ pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got
         }
         names.push(name.clone());
         let axes = &AXES[..world.dimension];
-        let place = table.table("where", |t| place(&t, world, bodies));
+        let place = match table.one_of(&["where", "surface"])? {
+            "where" => table.table("where", |t| place(&t, world, bodies)),
+            _ => support(&table, world, bodies, read).map(Place::Surface),
+        };
         let fix = table.choices("fix", axes);
         let displacement = table.table_if("displacement", |t| {
             t.refuse(&AXES[world.dimension..], "the problem is 2D")?;
@@ -40,13 +50,17 @@ pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got
         });
         let (place, fix) = (place?, fix?);
         let (displacement, rotation) = (displacement?.unwrap_or_default(), rotation?);
+        if let Place::Surface(support) = &place {
+            table.refuse(&["rotation"], "not known of a surface; use displacement = { ... }")?;
+            if support.slip {
+                table.refuse(&["fix"], "slip holds the normal component already")?;
+            }
+            return checked(&table, Boundary { name, place, fix, displacement, rotation });
+        }
+        table.refuse(&["slip", "penalty"], "only with surface; nodes are held exactly")?;
         if fix.is_empty() && displacement.is_empty() && rotation.is_none() {
             let message = "prescribes nothing: expected fix, displacement or rotation";
             return Err(table.problem("", message));
-        }
-        if let Some((axis, _)) = displacement.iter().find(|(axis, _)| fix.contains(axis)) {
-            let message = format!("{} is held by fix and displaced too", AXES[*axis]);
-            return Err(table.problem("displacement", message));
         }
         let plane = |axis: &usize| *axis < 2;
         if rotation.is_some()
@@ -54,7 +68,34 @@ pub fn boundaries(root: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got
         {
             return Err(table.problem("rotation", "x and y are prescribed already"));
         }
-        Ok(Boundary { name, place, fix, displacement, rotation })
+        checked(&table, Boundary { name, place, fix, displacement, rotation })
+    })
+}
+
+/// A boundary whose components are prescribed once.
+fn checked(table: &Table<'_>, boundary: Boundary) -> Got<Boundary> {
+    let twice = boundary.displacement.iter().find(|(axis, _)| boundary.fix.contains(axis));
+    match twice {
+        Some((axis, _)) => {
+            let message = format!("{} is held by fix and displaced too", AXES[*axis]);
+            Err(table.problem("displacement", message))
+        }
+        None => Ok(boundary),
+    }
+}
+
+fn support(
+    table: &Table<'_>,
+    world: &World<'_>,
+    bodies: &[String],
+    read: Option<&[Body]>,
+) -> Got<Support> {
+    let surface = table.table("surface", |t| surfaces::held(&t, world.dimension, bodies, read));
+    let (slip, penalty) = (table.flag_if("slip"), table.number_if("penalty"));
+    Ok(Support {
+        surface: surface?,
+        slip: slip?.unwrap_or(false),
+        penalty: penalty?.unwrap_or(PENALTY),
     })
 }
 
@@ -109,40 +150,8 @@ fn body(table: &Table<'_>, key: &'static str, bodies: &[String]) -> Got<usize> {
         .ok_or_else(|| table.unknown_word(key, &name, &known, table.origin(key)))
 }
 
-fn traction(
-    table: &Table<'_>,
-    dimension: usize,
-    names: &[String],
-    read: Option<&[Body]>,
-) -> Got<Load> {
-    let body = of_body(table, names);
-    let side = table.choice_of("side", &SIDES[..2 * dimension]);
-    let value = table.expressions_if("value", dimension)?;
-    let (body, side) = (body?, side?);
-    let value = value.ok_or_else(|| table.missing("value", ""))?;
-    let (axis, upper) = (side / 2, side % 2 == 1);
-    // Bodies with faults of their own have been told of.
-    let Some(read) = read else {
-        let side = BodySide { body, axis, upper, at: 0.0, area: 0.0 };
-        return Ok(Load::Traction { side, value });
-    };
-    let shape = match &read[body].source {
-        BodySource::Shape { shape, .. } if shape.placement.rotate.is_none() => Some(shape),
-        _ => None,
-    };
-    let Some((shape, Form::Box { min, max })) = shape.map(|shape| (shape, &shape.form)) else {
-        let what = format!("body \"{}\" is not a box along the axes, which has sides", names[body]);
-        let help = "use pressure, which needs no sides, or give the body as a box";
-        return Err(table.problem_with_help("side", what, help));
-    };
-    let corner = if upper { max } else { min };
-    let at = corner[axis] + shape.placement.translate.get(axis).copied().unwrap_or(0.0);
-    let area = (0..dimension).filter(|&a| a != axis).map(|a| max[a] - min[a]).product();
-    Ok(Load::Traction { side: BodySide { body, axis, upper, at, area }, value })
-}
-
 /// The body that key `body` names, or the only one.
-fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
+pub(super) fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
     match (table.given("body"), names) {
         (false, [_]) => Ok(0),
         (false, _) => Err(table.missing("body", "the deck has several bodies")),
@@ -199,7 +208,12 @@ pub fn loads(
                 }
                 Ok(Load::Gravity(gravity))
             }
-            "traction" => table.table("traction", |t| traction(&t, dimension, names, read)),
+            "traction" => table.table("traction", |t| {
+                let surface = surfaces::body_surface(&t, dimension, names, read);
+                let value = t.expressions_if("value", dimension)?;
+                let value = value.ok_or_else(|| t.missing("value", ""))?;
+                Ok(Load::Traction { surface: surface?, value })
+            }),
             "pressure" => table.table("pressure", |t| {
                 let value = t.expression_if("value");
                 let zone = t.table_if("where", |t| {
@@ -214,7 +228,13 @@ pub fn loads(
                 if let Err(why) = value.averaged() {
                     return Err(t.problem("value", why));
                 }
-                Ok(Load::Pressure { value, zone: zone? })
+                if !t.given("surface") {
+                    return Ok(Load::Pressure { value, zone: zone? });
+                }
+                t.refuse(&["where"], "surface has a where of its own")?;
+                let surface =
+                    t.table("surface", |t| surfaces::body_surface(&t, dimension, names, read));
+                Ok(Load::SurfacePressure { surface: surface?, value })
             }),
             _ => {
                 let all = table.expressions_if(key, dimension)?;

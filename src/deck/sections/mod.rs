@@ -10,6 +10,7 @@
 //! | `bodies.rs` | body |
 //! | `shapes.rs` | body.shape |
 //! | `conditions.rs` | boundary, load |
+//! | `surfaces.rs` | boundary.surface, and the surfaces of loads |
 //! | `restraint.rs` | whether rigid motion is held |
 //! | `probes.rs` | probe |
 //! | `results.rs` | verify, output, parallel |
@@ -27,6 +28,7 @@ mod probes;
 mod restraint;
 mod results;
 mod shapes;
+mod surfaces;
 
 use std::path::Path;
 
@@ -68,7 +70,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     };
     let bodies = bodies::bodies(&root, &world);
     let names = bodies::names(&root);
-    let boundaries = conditions::boundaries(&root, &world, &names);
+    let boundaries = conditions::boundaries(&root, &world, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
     let verify = results::verify(&root, dimension);
     let probes = probes::probes(&root, dimension, &names);

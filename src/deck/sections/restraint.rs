@@ -18,12 +18,7 @@ pub fn check(
     }
     let held = |axis: usize| {
         let floats = loads.iter().any(|load| load.may_hold(axis));
-        floats
-            || boundaries.iter().any(|boundary| {
-                boundary.fix.contains(&axis)
-                    || boundary.displacement.iter().any(|(component, _)| *component == axis)
-                    || (boundary.rotation.is_some() && axis < 2)
-            })
+        floats || boundaries.iter().any(|boundary| boundary.may_hold(axis))
     };
     let free: Vec<&str> =
         (0..dimension).filter(|axis| !held(*axis)).map(|axis| AXES[axis]).collect();

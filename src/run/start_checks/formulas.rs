@@ -8,7 +8,7 @@ use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::loads::pressure::PressureAt;
-use crate::loads::{Moment, scope_of};
+use crate::loads::{Moment, OnSurface, scope_of};
 use crate::material::local;
 use crate::parallel::World;
 use crate::points::Points;
@@ -84,10 +84,10 @@ fn loads<const D: usize>(
                     ),
                 ))
             }),
-            Load::Gravity(force) | Load::BodyForce(force) | Load::Traction { value: force, .. } => {
+            Load::Traction { .. } | Load::SurfacePressure { .. } => on_surface(model, index, ends),
+            Load::Gravity(force) | Load::BodyForce(force) => {
                 let (key, unit) = match load {
                     Load::Gravity(_) => ("gravity", "m/s2"),
-                    Load::Traction { .. } => ("traction.value", "Pa"),
                     _ => ("body_force", "N/m3"),
                 };
                 let fault = |p: usize| {
@@ -192,6 +192,10 @@ fn boundaries<const D: usize>(
             let key = format!("boundary.{index}.where.cells_of");
             return Err(Error::Input(deck.places.say(&key, &why)));
         }
+        if boundary.support().is_some() {
+            prescribed(model, index, span)?;
+            continue;
+        }
         let alone = std::slice::from_ref(boundary);
         let basis = deck.method.basis;
         let found = Conditions::evaluate(world, grid, basis, numbering, points, alone, span);
@@ -212,6 +216,65 @@ fn boundaries<const D: usize>(
     }
     warnings.extend(contest.warning(world, deck, grid, numbering));
     Ok(warnings)
+}
+
+/// What is wrong with the value of a load on a surface, if anything; alike on all ranks.
+fn on_surface<const D: usize>(
+    model: &Model<D>,
+    index: usize,
+    ends: [(f64, f64); 2],
+) -> Option<String> {
+    let kind = model.deck.analysis.kind;
+    ends.into_iter().find_map(|(s, t)| {
+        let at = Moment::new(kind, s, t);
+        let (key, value, place) = match model.loads[index].on_surface()? {
+            OnSurface::Traction { surface, value } => {
+                surface.elements().iter().find_map(|own| {
+                    let place = own.element.place;
+                    let mut scope = at.scope();
+                    scope.initial[..D].copy_from_slice(&place);
+                    let values: [f64; D] = at.values(value, &scope);
+                    let wrong = values.into_iter().find(|v| !v.is_finite())?;
+                    Some(("traction.value", wrong, place))
+                })?
+            }
+            OnSurface::Pressure { surface, pressure } => {
+                surface.elements().iter().find_map(|own| {
+                    let (place, mut found) = (own.element.place, PressureAt::<D>::default());
+                    pressure.add_at(&place, &[0.0; D], at, &mut found);
+                    (!found.is_finite()).then_some(("pressure.value", found.value, place))
+                })?
+            }
+        };
+        let why = format!(
+            "is {value} Pa at {place:?} m on the surface, s = {s}: the expression or a derivative of \
+             it is not finite there"
+        );
+        Some(model.deck.places.say(&format!("load.{index}.{key}"), &why))
+    })
+}
+
+/// An error where the displacement of a support is not finite at an end of the first step; alike on all
+/// ranks.
+fn prescribed<const D: usize>(model: &Model<D>, index: usize, span: StepSpan) -> Result<()> {
+    let kind = model.deck.analysis.kind;
+    for support in model.supports.iter().filter(|support| support.boundary == index) {
+        for (s, t) in [(span.factor_start, span.time_start), (span.factor_end, span.time_end)] {
+            let at = Moment::new(kind, s, t);
+            for own in support.surface.elements() {
+                let u = support.prescribed(&own.element, at);
+                if let Some(axis) = u.iter().position(|u| !u.is_finite()) {
+                    let why = format!(
+                        "is {} m at {:?} m on the surface, s = {s}: the expression is not finite there",
+                        u[axis], own.element.place
+                    );
+                    let key = format!("boundary.{index}.displacement.{}", AXES[axis]);
+                    return Err(Error::Input(model.deck.places.say(&key, &why)));
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Why a box holds no node of the grid, if it holds none.

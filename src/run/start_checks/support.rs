@@ -16,6 +16,7 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 use crate::system::numbering::Touched;
 use crate::system::populated::Populated;
+use crate::system::terms::surface;
 
 use super::pieces;
 use crate::system::model::Model;
@@ -125,6 +126,7 @@ fn loose<const D: usize>(
             }
         }
     }
+    add_supports(model, points, numbering, &pieces, (middle, length), &mut grams)?;
     let free = of_all_ranks(world, model, grams)?.into_iter().find_map(|(piece, gram)| {
         if let Some(pulled) = pulled {
             let axis = (0..D).find(|&a| pulled[a] && gram[a * motions + a] == 0.0)?;
@@ -140,6 +142,52 @@ fn loose<const D: usize>(
     let Some(motion) = world.first_message(motion) else { return Ok(None) };
     let what = name_piece(world, model, points, numbering, &pieces, first)?;
     Ok(Some((what, motion)))
+}
+
+/// Adds what surfaces that are held keep of the rigid motions: a row for each direction in which an
+/// element is held, to the piece that its carrier belongs to.
+fn add_supports<const D: usize>(
+    model: &Model<D>,
+    points: &Points<D>,
+    numbering: &Numbering,
+    pieces: &[u64],
+    (middle, length): ([f64; D], f64),
+    grams: &mut BTreeMap<u64, Vec<f64>>,
+) -> Result<()> {
+    let motions = D + D * (D - 1) / 2;
+    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
+    for p in surface::carriers(model, points) {
+        cells.clear();
+        nodes.clear();
+        basis::populated_cells(&model.grid, model.deck.method.basis, points, p, None, &mut cells)?;
+        cells.iter().for_each(|&cell| model.grid.cell_nodes(cell, &mut nodes));
+        let Some(piece) = nodes.iter().find_map(|&n| numbering.local(n).map(|n| pieces[n])) else {
+            continue;
+        };
+        for support in &model.supports {
+            for own in support.surface.carried_by(points.id[p]) {
+                let place = own.element.place;
+                if support.within.as_ref().is_some_and(|sheet| !sheet.holds(&place)) {
+                    continue;
+                }
+                let x: [f64; D] = std::array::from_fn(|a| (place[a] - middle[a]) / length);
+                let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
+                for direction in support.projection(&own.element) {
+                    let mut row = vec![0.0; motions];
+                    for (component, share) in direction.iter().enumerate() {
+                        let all = motions_at(&x, component);
+                        row.iter_mut().zip(all).for_each(|(sum, value)| *sum += share * value);
+                    }
+                    for (i, a) in row.iter().enumerate() {
+                        for (j, b) in row.iter().enumerate() {
+                            gram[i * motions + j] += a * b;
+                        }
+                    }
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Ghost faces that hold cells together which share no node: only among simplices.

@@ -6,15 +6,21 @@
 //! | what each of them says of itself | `term.rs` | |
 //! | internal force and tangent stiffness of the points | `stress.rs` | Lagrangian eq. 27, 28 |
 //! | pressures by virtual stress | `pressure.rs` | Given et al. 2024 |
+//! | tractions, pressures and supports on surfaces | `surface.rs` | formulations.md B.6 |
+//! | both of these as external forces that follow the motion | `following.rs` | |
+//! | their dense blocks | `block.rs` | |
 //! | Ghost stiffness | `ghost.rs` | Ghost eq. 27, 28 |
 //! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
 //! | products of the last two | `scalar.rs` | |
 
+mod block;
+pub mod following;
 pub mod ghost;
 pub mod inertia;
 pub mod pressure;
 mod scalar;
 pub mod stress;
+pub mod surface;
 pub mod term;
 
 pub use term::Term;

@@ -9,16 +9,14 @@
 
 use std::ops::Range;
 
-use crate::error::Result;
 use crate::loads::Moment;
 use crate::loads::pressure::{Pressure, PressureAt};
-use crate::parallel::World;
 use crate::system::model::Model;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{BlockMatrix, BlockRows};
-use crate::system::step_system::Discretisation;
 use crate::tensor::dense;
 
+use super::block::add_block;
 use super::stress::{StepPoints, displacement_gradient, start_volume};
 use super::term::{At, Part};
 
@@ -159,48 +157,5 @@ impl<'a> PressureTerm<'a> {
             self.add_shares(step, part, at, &mut force, None::<&mut BlockMatrix<D>>);
         }
         force
-    }
-
-    /// [`Self::at_start`] of all ranks at the owned nodes. Collective.
-    pub fn owned_at_start<const D: usize>(
-        &self,
-        world: &World,
-        mesh: &Discretisation<D>,
-        step: StepPoints<'_, D>,
-    ) -> Result<Vec<f64>> {
-        let numbering = &mesh.numbering;
-        let mut force = self.at_start(step, &mesh.pattern, numbering.len());
-        numbering.halo.reverse_add(world, &mut force, D)?;
-        force.truncate(numbering.owned * D);
-        Ok(force)
-    }
-}
-
-/// Adds the dense matrix of a group: entry (a, i, b, k) at ((a D + i) nodes + b) D + k.
-fn add_block<const D: usize, R: BlockRows<D>>(
-    pattern: &Pattern,
-    group: usize,
-    nodes: &[u32],
-    block: &[f64],
-    rows: &mut R,
-) {
-    let (place, count) = (pattern.places.of(group), nodes.len());
-    let runs = count / place.run;
-    for (a, &node) in nodes.iter().enumerate() {
-        let row = pattern.row_of[node as usize] as usize;
-        rows.touch(pattern, row);
-        let width = D * (pattern.offsets[row + 1] - pattern.offsets[row]);
-        let start = rows.start(pattern, row);
-        for i in 0..D {
-            let target = rows.values(start + i * width, width);
-            let source = &block[(a * D + i) * count * D..(a * D + i + 1) * count * D];
-            for b in 0..count {
-                let first = usize::from(place.positions[a * runs + b / place.run]);
-                let column = (first + b % place.run) * D;
-                for k in 0..D {
-                    target[column + k] += source[b * D + k];
-                }
-            }
-        }
     }
 }

@@ -1,0 +1,99 @@
+//! Surfaces of a deck at the start: their elements, and the points that carry them.
+
+use crate::deck::Deck;
+use crate::deck::model::{BodySource, BodySurface, Held};
+use crate::deck::shape::Shape;
+use crate::error::{Error, Result};
+use crate::parallel::World;
+use crate::points::Points;
+use crate::surface::of_shape::{self, Part};
+use crate::surface::sheet::Sheet;
+use crate::surface::{Surface, carriers};
+use crate::system::supports::Support;
+
+/// A part of a body's own surface; `key`: where the deck asks for it. Collective. Error: nothing of the
+/// surface belongs to the part.
+pub fn of_body<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    points: &Points<D>,
+    wanted: &BodySurface,
+    key: &str,
+) -> Result<Surface<D>> {
+    let body = &deck.bodies[wanted.body];
+    let wrong = |why: &str| Error::Input(deck.places.say(key, why));
+    let Some(shape) = shape_of(deck, wanted.body) else {
+        return Err(wrong(&format!("body \"{}\" is not given as a shape", body.name)));
+    };
+    let spacing = carriers::spacing(world, points, wanted.body);
+    let part = Part { side: wanted.side, within: wanted.within.as_ref() };
+    let elements = of_shape::elements::<D>(shape, part, spacing);
+    if elements.is_empty() {
+        return Err(wrong(&format!(
+            "no part of the surface of body \"{}\" is there: side and where leave nothing of it",
+            body.name
+        )));
+    }
+    let what = format!("body \"{}\"", body.name);
+    let carried = carriers::carried(world, points, wanted.body, &elements, spacing, &what);
+    carried.map(Surface::new).map_err(|error| wrong(&error.to_string()))
+}
+
+/// The supports of a deck; `cell`: size of the grid's cells, m. Collective.
+pub fn supports<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    points: &Points<D>,
+    cell: f64,
+) -> Result<Vec<Support<D>>> {
+    let mut supports = Vec::new();
+    for (index, boundary) in deck.boundaries.iter().enumerate() {
+        let Some(wanted) = boundary.support() else { continue };
+        let key = format!("boundary.{index}.surface");
+        let (surface, within) = match &wanted.surface {
+            Held::Surface(part) => (of_body(world, deck, points, part, &key)?, None),
+            Held::Sheet(corners) => {
+                let sheet = Sheet::new(corners);
+                let surface = on_sheet(world, deck, points, &sheet, wanted.slip, &key)?;
+                (surface, wanted.slip.then_some(sheet))
+            }
+        };
+        supports.extend(Support::new((index, boundary), surface, within, cell));
+    }
+    Ok(supports)
+}
+
+/// What lies on a line or plane, of all bodies; with `slip` what may slide onto it, too. Collective.
+fn on_sheet<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    points: &Points<D>,
+    sheet: &Sheet<D>,
+    slip: bool,
+    key: &str,
+) -> Result<Surface<D>> {
+    let mut all = Vec::new();
+    for body in 0..deck.bodies.len() {
+        let Some(shape) = shape_of(deck, body) else { continue };
+        let spacing = carriers::spacing(world, points, body);
+        let elements = sheet.elements(shape, spacing, slip);
+        let what = format!("body \"{}\"", deck.bodies[body].name);
+        let carried = carriers::carried(world, points, body, &elements, spacing, &what);
+        let carried =
+            carried.map_err(|error| Error::Input(deck.places.say(key, &error.to_string())))?;
+        all.extend(carried);
+    }
+    if !all.iter().any(|(_, own)| sheet.holds(&own.element.place)) {
+        let why = "no material of a body given as a shape lies there at the start: what comes later is \
+                   not held by it";
+        return Err(Error::Input(deck.places.say(key, why)));
+    }
+    Ok(Surface::new(all))
+}
+
+fn shape_of(deck: &Deck, body: usize) -> Option<&Shape> {
+    match &deck.bodies[body].source {
+        BodySource::Shape { shape, .. } => Some(shape),
+        _ => None,
+    }
+}

@@ -1,0 +1,94 @@
+//! Surfaces that are held where they were at the start, or driven, by a penalty (formulations.md
+//! B.6 (a)): the force on an element of the area A is -β A P (x_s - X_s - ū), with P the unit tensor,
+//! chosen components or n ⊗ n, and β = penalty E / h.
+
+use crate::deck::Scope;
+use crate::deck::expression::Expression;
+use crate::deck::model::Boundary;
+use crate::loads::Moment;
+use crate::surface::sheet::Sheet;
+use crate::surface::{Element, Surface, norm};
+
+/// What is held of an element.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Hold<const D: usize> {
+    Components([bool; D]),
+    /// Along the normal at the start.
+    Normal,
+}
+
+/// A support of the deck with its surface.
+pub struct Support<const D: usize> {
+    /// Index into the deck's boundaries.
+    pub boundary: usize,
+    pub surface: Surface<D>,
+    hold: Hold<D>,
+    /// β over the stiffness of the body, 1/m.
+    pub penalty: f64,
+    displacement: Vec<(usize, Expression)>,
+    /// What lies beyond it is free.
+    pub within: Option<Sheet<D>>,
+}
+
+impl<const D: usize> Support<D> {
+    /// `cell`: size of the grid's cells, m. `None` for a boundary that holds nodes.
+    pub fn new(
+        (index, boundary): (usize, &Boundary),
+        surface: Surface<D>,
+        within: Option<Sheet<D>>,
+        cell: f64,
+    ) -> Option<Self> {
+        let support = boundary.support()?;
+        let mut components = [boundary.fix.is_empty() && boundary.displacement.is_empty(); D];
+        let driven = boundary.displacement.iter().map(|(axis, _)| *axis);
+        boundary.fix.iter().copied().chain(driven).for_each(|axis| components[axis] = true);
+        let hold = if support.slip { Hold::Normal } else { Hold::Components(components) };
+        Some(Support {
+            boundary: index,
+            surface,
+            hold,
+            penalty: support.penalty / cell,
+            displacement: boundary.displacement.clone(),
+            within,
+        })
+    }
+
+    /// P
+    pub fn projection(&self, element: &Element<D>) -> [[f64; D]; D] {
+        match &self.hold {
+            Hold::Components(held) => std::array::from_fn(|i| {
+                std::array::from_fn(|j| if i == j && held[i] { 1.0 } else { 0.0 })
+            }),
+            Hold::Normal => {
+                let size = norm(&element.area);
+                let n = element.area.map(|a| a / size);
+                std::array::from_fn(|i| std::array::from_fn(|j| n[i] * n[j]))
+            }
+        }
+    }
+
+    /// ū at an element, m: a value that holds neither s nor t is reached linearly with the load
+    /// factor, one that does counts from the start.
+    pub fn prescribed(&self, element: &Element<D>, at: Moment) -> [f64; D] {
+        let mut u = [0.0; D];
+        for (axis, expression) in &self.displacement {
+            let mut initial = [0.0; 3];
+            initial[..D].copy_from_slice(&element.place);
+            let value = |load_factor: f64, time: f64| {
+                expression.value(&Scope { initial, current: initial, load_factor, time })
+            };
+            let now = value(at.load_factor, at.time);
+            u[*axis] = match expression.depends_on_time() {
+                true => now - value(0.0, 0.0),
+                false => now * at.load_factor,
+            };
+        }
+        u
+    }
+
+    /// Where an element has to be, m.
+    pub fn target(&self, element: &Element<D>, at: Moment) -> [f64; D] {
+        let u = self.prescribed(element, at);
+        std::array::from_fn(|i| element.place[i] + u[i])
+    }
+}

@@ -1,0 +1,33 @@
+//! A dense matrix of a group of points, added to the system as a whole.
+
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockRows;
+
+/// Adds the dense matrix of a group: entry (a, i, b, k) at ((a D + i) nodes + b) D + k.
+pub(super) fn add_block<const D: usize, R: BlockRows<D>>(
+    pattern: &Pattern,
+    group: usize,
+    nodes: &[u32],
+    block: &[f64],
+    rows: &mut R,
+) {
+    let (place, count) = (pattern.places.of(group), nodes.len());
+    let runs = count / place.run;
+    for (a, &node) in nodes.iter().enumerate() {
+        let row = pattern.row_of[node as usize] as usize;
+        rows.touch(pattern, row);
+        let width = D * (pattern.offsets[row + 1] - pattern.offsets[row]);
+        let start = rows.start(pattern, row);
+        for i in 0..D {
+            let target = rows.values(start + i * width, width);
+            let source = &block[(a * D + i) * count * D..(a * D + i + 1) * count * D];
+            for b in 0..count {
+                let first = usize::from(place.positions[a * runs + b / place.run]);
+                let column = (first + b % place.run) * D;
+                for k in 0..D {
+                    target[column + k] += source[b * D + k];
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! What acts on elements of bodies' surfaces ([`crate::surface`]), at the current state of an
+//! iteration: tractions, pressures, and penalties that hold.
+//!
+//! With the weights w_a = S_a + ∇S_a·(x_s - x_p) of the step's start an element moves to
+//! x_s + Σ w_a u_a, and a force f on it gives w_a f to the nodes. The tangent of -f is
+//!
+//! | | f | K_aibk |
+//! |---|---|---|
+//! | traction | t A0 | 0 |
+//! | pressure | -p a, a = det dF dF^-T a_start | w_a [a_i q_k w_b + p (a_i g_bk - g_bi a_k)], q = ∇p, g = ∇S dF^-1 |
+//! | penalty | -β A0 P (x_s - X_s - ū) | β A0 P_ik w_a w_b |
+
+use crate::deck::expression::Expression;
+use crate::loads::pressure::{Pressure, PressureAt};
+use crate::loads::{Moment, OnSurface};
+use crate::points::Points;
+use crate::surface::{Carried, Element, norm};
+use crate::system::model::Model;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockRows;
+use crate::system::supports::Support;
+use crate::tensor::dense;
+
+use super::block::add_block;
+use super::stress::{StepPoints, displacement_gradient};
+use super::term::{At, Part};
+
+/// Everything that acts on surfaces at one moment, as this rank's points carry it.
+pub struct SurfaceTerm<'a, const D: usize> {
+    acts: Vec<Act<'a, D>>,
+    /// Those of groups that touch nodes of other ranks come first.
+    reaching: usize,
+    weights: Vec<f64>,
+    at: Moment,
+}
+
+/// One action on one element.
+struct Act<'a, const D: usize> {
+    point: usize,
+    group: usize,
+    /// First of its weights.
+    weights: usize,
+    /// x_s at the step's start, m.
+    place: [f64; D],
+    /// J F^-T A then, m2.
+    area: [f64; D],
+    element: &'a Element<D>,
+    kind: Kind<'a, D>,
+}
+
+#[derive(Clone, Copy)]
+enum Kind<'a, const D: usize> {
+    Traction(&'a [Expression]),
+    Pressure(&'a Pressure),
+    /// With β, Pa/m.
+    Held(&'a Support<D>, f64),
+}
+
+/// What a support bears, this rank's share: force, sum of magnitudes, torque about z through the
+/// origin, and volume of the points that carry it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Borne {
+    pub force: [f64; 3],
+    pub sum_abs: f64,
+    pub torque: f64,
+    pub held: f64,
+}
+
+impl Borne {
+    /// (1 - share) of this and `share` of another.
+    pub fn mixed(&self, other: &Borne, share: f64) -> Borne {
+        let mix = |a: f64, b: f64| (1.0 - share) * a + share * b;
+        Borne {
+            force: std::array::from_fn(|i| mix(self.force[i], other.force[i])),
+            sum_abs: mix(self.sum_abs, other.sum_abs),
+            torque: mix(self.torque, other.torque),
+            held: self.held,
+        }
+    }
+}
+
+impl<'a, const D: usize> SurfaceTerm<'a, D> {
+    /// `None` where nothing of the deck acts on a surface. `carriers`: this rank's points that carry
+    /// elements ([`carriers`]).
+    pub fn new(
+        model: &'a Model<D>,
+        step: StepPoints<'_, D>,
+        carriers: &[usize],
+        load_factor: f64,
+        time: f64,
+    ) -> Option<Self> {
+        if !model.acts_on_surfaces() {
+            return None;
+        }
+        let at = Moment::new(model.deck.analysis.kind, load_factor, time);
+        let points = step.points;
+        let mut term = SurfaceTerm { acts: Vec::new(), reaching: 0, weights: Vec::new(), at };
+        for &p in carriers {
+            let id = points.id[p];
+            for load in model.loads.iter().filter_map(|load| load.on_surface()) {
+                let (surface, kind) = match load {
+                    OnSurface::Traction { surface, value } => (surface, Kind::Traction(value)),
+                    OnSurface::Pressure { surface, pressure } => {
+                        (surface, Kind::Pressure(pressure))
+                    }
+                };
+                surface.carried_by(id).iter().for_each(|own| term.push(step, p, own, kind));
+            }
+            for support in &model.supports {
+                let stiffness = support.penalty * model.stiffness[points.body[p] as usize];
+                for own in support.surface.carried_by(id) {
+                    let place = place_of(points, p, own);
+                    if support.within.as_ref().is_none_or(|sheet| sheet.holds(&place)) {
+                        term.push(step, p, own, Kind::Held(support, stiffness));
+                    }
+                }
+            }
+        }
+        let mut reaches = vec![false; step.groups.len()];
+        step.border.reaching.iter().cloned().flatten().for_each(|group| reaches[group] = true);
+        term.acts.sort_by_key(|act| (!reaches[act.group], act.group));
+        term.reaching = term.acts.partition_point(|act| reaches[act.group]);
+        Some(term)
+    }
+
+    fn push(
+        &mut self,
+        step: StepPoints<'_, D>,
+        point: usize,
+        own: &'a Carried<D>,
+        kind: Kind<'a, D>,
+    ) {
+        let points = step.points;
+        let place = place_of(points, point, own);
+        let offset: [f64; D] = std::array::from_fn(|i| place[i] - points.position[point][i]);
+        let first = self.weights.len();
+        let row = step.influences.row(point);
+        let of_node = |(s, g): (&f64, &[f64; D])| s + dense::dot(g, &offset);
+        let weights = step.influences.weights[row.clone()].iter();
+        self.weights.extend(weights.zip(&step.influences.gradients[row]).map(of_node));
+        self.acts.push(Act {
+            point,
+            group: step.groups.group_of_point[point],
+            weights: first,
+            place,
+            area: carried_area(&in_space(points, point), &own.element.area),
+            element: &own.element,
+            kind,
+        });
+    }
+
+    /// Adds this rank's shares of the force at an iterate, N, and the tangent of its negative where
+    /// there are `rows`.
+    pub fn add_shares<R: BlockRows<D>>(
+        &self,
+        step: StepPoints<'_, D>,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        mut rows: Option<&mut R>,
+    ) {
+        let acts = match part {
+            Part::Reaching => &self.acts[..self.reaching],
+            Part::Inner => &self.acts[self.reaching..],
+        };
+        let mut block = Vec::new();
+        for acts in acts.chunk_by(|a, b| a.group == b.group) {
+            let group = acts[0].group;
+            let nodes = step.nodes_of_group(group);
+            block.clear();
+            if rows.is_some() {
+                block.resize(nodes.len() * nodes.len() * D * D, 0.0);
+            }
+            for act in acts {
+                let f = self.push_on(act, step, nodes, at.displacement, &mut block);
+                for (&node, weight) in nodes.iter().zip(self.weights_of(act, nodes)) {
+                    for i in 0..D {
+                        force[node as usize * D + i] += weight * f[i];
+                    }
+                }
+            }
+            if let Some(rows) = rows.as_deref_mut() {
+                add_block(at.pattern, group, nodes, &block, rows);
+            }
+        }
+    }
+
+    /// This rank's share of the force at `nodes` local nodes at the step's start, N.
+    pub fn at_start(&self, step: StepPoints<'_, D>, pattern: &Pattern, nodes: usize) -> Vec<f64> {
+        let (displacement, mut force) = (vec![0.0; nodes * D], vec![0.0; nodes * D]);
+        let at = At { pattern, displacement: &displacement };
+        for part in [Part::Reaching, Part::Inner] {
+            let none: Option<&mut crate::system::scatter::BlockMatrix<D>> = None;
+            self.add_shares(step, part, at, &mut force, none);
+        }
+        force
+    }
+
+    /// What each of the deck's `boundaries` that are supports bears at an iterate, this rank's share.
+    pub fn borne(
+        &self,
+        step: StepPoints<'_, D>,
+        displacement: &[f64],
+        boundaries: usize,
+    ) -> Vec<Borne> {
+        let mut borne = vec![Borne::default(); boundaries];
+        let mut last = vec![usize::MAX; boundaries];
+        for act in &self.acts {
+            let Kind::Held(support, _) = act.kind else { continue };
+            let nodes = step.nodes_of_group(act.group);
+            let f = self.push_on(act, step, nodes, displacement, &mut []);
+            let x = self.moved(act.place, act, nodes, displacement);
+            let sum = &mut borne[support.boundary];
+            sum.force.iter_mut().zip(f).for_each(|(sum, f)| *sum += f);
+            sum.sum_abs += norm(&f);
+            sum.torque += x[0] * f[1] - x[1] * f[0];
+            if std::mem::replace(&mut last[support.boundary], act.point) != act.point {
+                sum.held += step.points.volume(act.point);
+            }
+        }
+        borne
+    }
+
+    fn weights_of(&self, act: &Act<'_, D>, nodes: &[u32]) -> &[f64] {
+        &self.weights[act.weights..act.weights + nodes.len()]
+    }
+
+    /// `from` + Σ w_a u_a
+    fn moved(
+        &self,
+        from: [f64; D],
+        act: &Act<'_, D>,
+        nodes: &[u32],
+        displacement: &[f64],
+    ) -> [f64; D] {
+        let mut x = from;
+        for (&node, weight) in nodes.iter().zip(self.weights_of(act, nodes)) {
+            for (i, x) in x.iter_mut().enumerate() {
+                *x += weight * displacement[node as usize * D + i];
+            }
+        }
+        x
+    }
+
+    /// The force of an action at an iterate, N; its tangent is added to `block` unless that is empty.
+    fn push_on(
+        &self,
+        act: &Act<'_, D>,
+        step: StepPoints<'_, D>,
+        nodes: &[u32],
+        displacement: &[f64],
+        block: &mut [f64],
+    ) -> [f64; D] {
+        let weights = self.weights_of(act, nodes);
+        match act.kind {
+            Kind::Traction(value) => {
+                let traction: [f64; D] = self.at.values(value, &self.scope(act, &act.place));
+                let area = norm(&act.element.area);
+                traction.map(|t| t * area)
+            }
+            Kind::Held(support, stiffness) => {
+                // Apart from the place, in which small increments would lose their digits.
+                let target = support.target(act.element, self.at);
+                let start = std::array::from_fn(|i| act.place[i] - target[i]);
+                let gap = self.moved(start, act, nodes, displacement);
+                let scale = stiffness * norm(&act.element.area);
+                let stiff = support.projection(act.element).map(|row| row.map(|p| scale * p));
+                if !block.is_empty() {
+                    let rows = weights.iter().map(|w| stiff.map(|row| row.map(|k| w * k)));
+                    add_products::<D, _>(block, nodes.len(), rows, |b, of_a, i| {
+                        of_a[i].map(|k| k * weights[b])
+                    });
+                }
+                dense::apply(&stiff, &gap).map(|f| -f)
+            }
+            Kind::Pressure(pressure) => {
+                let x = self.moved(act.place, act, nodes, displacement);
+                let mut found = PressureAt::<D>::default();
+                pressure.add_at(&x, &[0.0; D], self.at, &mut found);
+                let gradients = &step.influences.gradients[step.influences.row(act.point)];
+                let increment = displacement_gradient(gradients, |a| {
+                    let first = nodes[a] as usize * D;
+                    std::array::from_fn(|i| displacement[first + i])
+                });
+                let change = dense::plus_unit(&increment);
+                let area = carried_area(&change, &act.area);
+                if !block.is_empty() {
+                    let (inverse, _) = dense::inverse(&change);
+                    let current: Vec<[f64; D]> = gradients
+                        .iter()
+                        .map(|g| {
+                            std::array::from_fn(|i| (0..D).map(|j| g[j] * inverse[j][i]).sum())
+                        })
+                        .collect();
+                    let (p, slope) = (found.value, found.first);
+                    add_products::<D, _>(block, nodes.len(), weights.iter().copied(), |b, w, i| {
+                        std::array::from_fn(|k| {
+                            let turned = area[i] * current[b][k] - current[b][i] * area[k];
+                            w * (area[i] * slope[k] * weights[b] + p * turned)
+                        })
+                    });
+                }
+                area.map(|a| -found.value * a)
+            }
+        }
+    }
+
+    fn scope(&self, act: &Act<'_, D>, place: &[f64; D]) -> crate::deck::Scope {
+        let mut scope = self.at.scope();
+        scope.initial[..D].copy_from_slice(&act.element.place);
+        scope.current[..D].copy_from_slice(place);
+        scope
+    }
+}
+
+/// This rank's points that carry elements of any surface of the deck.
+pub fn carriers<const D: usize>(model: &Model<D>, points: &Points<D>) -> Vec<usize> {
+    if !model.acts_on_surfaces() {
+        return Vec::new();
+    }
+    let surfaces = || {
+        let loads = model.loads.iter().filter_map(|load| load.on_surface());
+        let of_loads = loads.map(|load| match load {
+            OnSurface::Traction { surface, .. } | OnSurface::Pressure { surface, .. } => surface,
+        });
+        of_loads.chain(model.supports.iter().map(|support| &support.surface))
+    };
+    let carries = |&p: &usize| surfaces().any(|s| !s.carried_by(points.id[p]).is_empty());
+    (0..points.len()).filter(carries).collect()
+}
+
+/// Adds to a dense block of `count` nodes: entries (a, i, b, ·) are `entry(b, row of a, i)`.
+fn add_products<const D: usize, T>(
+    block: &mut [f64],
+    count: usize,
+    rows: impl Iterator<Item = T>,
+    entry: impl Fn(usize, &T, usize) -> [f64; D],
+) {
+    for (a, of_a) in rows.enumerate() {
+        for i in 0..D {
+            let line = &mut block[(a * D + i) * count * D..(a * D + i + 1) * count * D];
+            for (b, target) in line.chunks_exact_mut(D).enumerate() {
+                let values = entry(b, &of_a, i);
+                target.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
+            }
+        }
+    }
+}
+
+/// F of a point in the axes of the grid.
+fn in_space<const D: usize>(points: &Points<D>, p: usize) -> dense::Square<D> {
+    let gradient = &points.deformation_gradient[p];
+    std::array::from_fn(|i| std::array::from_fn(|j| gradient[(i, j)]))
+}
+
+/// x_s = x_p + F (X_s - X_p)
+pub fn place_of<const D: usize>(points: &Points<D>, p: usize, own: &Carried<D>) -> [f64; D] {
+    let offset = dense::apply(&in_space(points, p), &own.offset);
+    std::array::from_fn(|i| points.position[p][i] + offset[i])
+}
+
+/// det F F^-T A (Nanson).
+fn carried_area<const D: usize>(gradient: &dense::Square<D>, area: &[f64; D]) -> [f64; D] {
+    let (inverse, determinant) = dense::inverse(gradient);
+    std::array::from_fn(|i| determinant * (0..D).map(|j| inverse[j][i] * area[j]).sum::<f64>())
+}
