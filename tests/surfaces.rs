@@ -344,7 +344,7 @@ fn cylinder(young: f64) -> Vec<f64> {
                     count += 1.0;
                 }
             }
-            let front = (sum / count as f64).sqrt();
+            let front = f64::sqrt(sum / count);
             (pressure(front) / pressure(fronts[step - 1]) - 1.0).abs()
         })
         .collect()
