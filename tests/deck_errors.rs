@@ -48,7 +48,7 @@ beam.toml:6:1: analysis.tolerence: unknown key \"tolerence\"
  6 | tolerence = 1e-9
    | ^^^^^^^^^
    = did you mean \"tolerance\"?
-   = known keys of [analysis]: type, steps, duration, cfl, tolerance, max_iterations, on_failure, \
+   = known keys of [analysis]: type, symmetry, steps, duration, cfl, tolerance, max_iterations, on_failure, \
 smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha"
     );
 }

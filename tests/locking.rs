@@ -88,7 +88,7 @@ fn strained<const D: usize>(
     let mesh = Discretisation::new(world, model, points)?;
     let first = field(&mesh, 0.03, 0.4);
     let made = update::increments(mesh.step_points(points, &model.materials), &first);
-    assert!(!made.averaged.is_empty());
+    assert!(!made.averaged.blocks.is_empty());
     update::stretch(&made.deformation, points, None);
     update::respond(&model.materials, made.straining(), points, None);
     Discretisation::new(world, model, points)
@@ -204,7 +204,7 @@ fn uniform<const D: usize>(world: &World, basis: &str) -> Result<()> {
             })
             .collect();
         let made = update::increments(mesh.step_points(&points, &model.materials), &nodal);
-        for (own, averaged) in made.deformation.iter().zip(&made.averaged) {
+        for (own, averaged) in made.deformation.blocks.iter().zip(&made.averaged.blocks) {
             for (own, averaged) in own.as_flattened().iter().zip(averaged.as_flattened()) {
                 assert!((own - averaged).abs() < 1e-14, "{basis} {D}D: {own:e}, {averaged:e}");
             }

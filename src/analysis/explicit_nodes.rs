@@ -20,7 +20,7 @@ use crate::record::clock::Clock;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
 use crate::transfer::affine::{self, Affine};
-use crate::transfer::mapping::{self, Pushed};
+use crate::transfer::mapping::{self, Deformation, Pushed};
 use crate::transfer::nodal_sums::{over_points, to_points};
 use crate::transfer::refusal::Halt;
 use crate::transfer::transport::Carrier;
@@ -168,7 +168,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
     pub fn forces(
         &mut self,
         points: &Points<D>,
-        deformation: &[Square<D>],
+        deformation: &Deformation<D>,
         clock: &mut Clock,
     ) -> Result<Forces<D>> {
         let step = self.mesh.step_points(points, &self.model.materials);
@@ -216,7 +216,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         velocity: &[f64],
         points: &mut Points<D>,
         before: &mut Snapshot<D>,
-    ) -> std::result::Result<(Vec<Square<D>>, PointEnergies), Halt> {
+    ) -> std::result::Result<(Deformation<D>, PointEnergies), Halt> {
         let step = self.mesh.step_points(points, &self.model.materials);
         let flip = self.model.deck.method.flip;
         let mut deforming = if carrier == Carrier::RemappedBack && flip < 1.0 {
@@ -229,7 +229,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let deformation = mapping::displacement_gradients(step, &deforming);
         let averaged = update::averaged(step, &deforming, &deformation);
         update::require_sound_deformation(self.world, points, &deformation, &averaged)?;
-        let straining = if averaged.is_empty() { &deformation } else { &averaged };
+        let straining = update::straining(&deformation, &averaged);
         update::stretch(&deformation, points, Some(before));
         let energies = update::respond(&self.model.materials, straining, points, Some(before));
         Ok((deformation, energies))

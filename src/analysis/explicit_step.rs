@@ -10,7 +10,6 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::following::Following;
 use crate::system::terms::stress::StepPoints;
-use crate::tensor::Square;
 
 use super::explicit_nodes::{Forces, Motion, Nodes};
 use crate::mass::grid_mass::GridMass;
@@ -24,7 +23,7 @@ use crate::record::step::{Solved, grid_side};
 use crate::system::model::Model;
 use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::affine::Affine;
-use crate::transfer::mapping::{self, Pushed};
+use crate::transfer::mapping::{self, Deformation, Pushed};
 use crate::transfer::refusal::Halt;
 use crate::transfer::transport::{self, Carrier};
 use crate::transfer::update::{self, Increments};
@@ -79,7 +78,8 @@ pub(crate) fn advance<const D: usize>(
     let Forces { pushed, mut acceleration } = match (forces, &first) {
         (Some(forces), _) => forces,
         (None, first) => {
-            let deformation = first.as_ref().map_or(&[][..], |(deformation, _)| deformation);
+            let none = Deformation::default();
+            let deformation = first.as_ref().map_or(&none, |(deformation, _)| deformation);
             nodes.forces(points, deformation, clock)?
         }
     };
@@ -105,7 +105,15 @@ pub(crate) fn advance<const D: usize>(
         *r += taken / dt;
     }
     let pressure_work: f64 = pressed.iter().zip(&moved).map(|(f, u)| f * u).sum();
-    let work = point_work(&external, &made.displacement)
+    // The force of a ring acts where its mass is, its place is the middle of its section.
+    let weighed;
+    let carried = if mesh.influences.hoop.is_empty() {
+        &made.displacement
+    } else {
+        weighed = mapping::at_points(step, &moved);
+        &weighed
+    };
+    let work = point_work(&external, carried)
         + pressure_work
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);
@@ -166,7 +174,7 @@ fn increments<const D: usize>(
     step: StepPoints<'_, D>,
     moved: &[f64],
     deforming: &[f64],
-    deformation: Option<Vec<Square<D>>>,
+    deformation: Option<Deformation<D>>,
 ) -> Increments<D> {
     if deformation.is_none() && deforming == moved {
         return update::increments(step, moved);
@@ -175,11 +183,15 @@ fn increments<const D: usize>(
     let later = deformation.is_none();
     let deformation =
         deformation.unwrap_or_else(|| mapping::displacement_gradients(step, deforming));
-    let averaged = if later { update::averaged(step, deforming, &deformation) } else { Vec::new() };
+    let averaged = if later {
+        update::averaged(step, deforming, &deformation)
+    } else {
+        Deformation::default()
+    };
     Increments {
         deformation,
         averaged,
-        displacement: mapping::at_points(step, moved),
+        displacement: mapping::places(step, moved),
         corners: Vec::new(),
     }
 }
@@ -198,8 +210,8 @@ fn refuse<const D: usize>(
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
     let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
-        deformation: vec![[[0.0; D]; D]; points.len()],
-        averaged: Vec::new(),
+        deformation: Deformation { blocks: vec![[[0.0; D]; D]; points.len()], hoops: Vec::new() },
+        averaged: Deformation::default(),
         displacement: made.displacement.clone(),
         corners: Vec::new(),
     });

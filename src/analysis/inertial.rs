@@ -117,7 +117,8 @@ impl InertialStep {
         let kind = model.deck.method.mass;
         let mass = clock.time(Phase::Assemble, || GridMass::assemble(world, mesh, step, kind))?;
         let (share_at_start, balance_start) = clock.time(Phase::Assemble, || {
-            let mut share = mapping::force(step, &loads.points_start, &[], numbering.len());
+            let mut share =
+                mapping::force(step, &loads.points_start, &Default::default(), numbering.len());
             add(share.as_flattened_mut(), 1.0, &loads.pressed_start);
             let mut balance = share.as_flattened().to_vec();
             numbering.halo.reverse_add(world, &mut balance, D)?;

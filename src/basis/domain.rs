@@ -11,7 +11,7 @@
 //! | `normal-incremental` | as `normal-corrected`, from the last step with dF | 39 |
 //!
 //! A half length is a size: F_ii counts by its magnitude, so a half turn keeps a domain. Scaling
-//! to the volume multiplies all half lengths by one factor such that their product is that of
+//! to the volume (with axisymmetry: to the area of the section) multiplies all half lengths by one factor such that their product is that of
 //! the initial ones times det F. The basis `mpm` has no domain; its half length is V^(1/D)/2 of
 //! the current volume whatever the rule. CPDI domains move in their own files.
 
@@ -23,6 +23,7 @@ use crate::deck::model::{Basis, DomainUpdate};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
+use crate::tensor::dense;
 use crate::tensor::spectral::square_root;
 
 /// Updates `points.half_length` at the end of a step: after `deformation_gradient`, and the corners
@@ -66,7 +67,7 @@ pub fn update_domains<const D: usize>(
             (Basis::Mpm, _) => [0.5 * root::<D>(points.volume(p)); D],
             (_, DomainUpdate::None) => continue,
             (_, DomainUpdate::Det) => {
-                let factor = root::<D>(gradient.determinant());
+                let factor = root::<D>(section_determinant::<D>(gradient));
                 initial.map(|l| l * factor)
             }
             (_, DomainUpdate::Normal) => scaled_by_diagonal(initial, gradient),
@@ -76,7 +77,7 @@ pub fn update_domains<const D: usize>(
             }
             (_, DomainUpdate::NormalCorrected) => {
                 let lengths = scaled_by_diagonal(initial, gradient);
-                with_product(lengths, gradient.determinant() * product(initial))
+                with_product(lengths, section_determinant::<D>(gradient) * product(initial))
             }
             (_, DomainUpdate::NormalIncremental) => {
                 let before = &points.half_length[p];
@@ -85,7 +86,7 @@ pub fn update_domains<const D: usize>(
             }
             (_, DomainUpdate::Corners) => {
                 let lengths = extent_of_moved_sides(grid, points, p, displacement)?;
-                let volume = gradient.determinant() * product(initial);
+                let volume = section_determinant::<D>(gradient) * product(initial);
                 let lengths = with_product(lengths, volume);
                 let of_stretch = extent_of_stretched_sides(initial, gradient);
                 if lengths.iter().zip(&longest(&of_stretch)).any(|(l, most)| *l > OVERGROWN * most)
@@ -104,6 +105,22 @@ pub fn update_domains<const D: usize>(
         points.half_length[p] = new;
     }
     Ok(overgrown)
+}
+
+/// Half lengths of the sections of `mpm`'s rings: A^(1/2)/2, A = V0 det F / (2π X F_zz) at the end of a
+/// step.
+pub fn update_sections<const D: usize>(points: &mut Points<D>) {
+    for p in 0..points.len() {
+        points.half_length[p] = [0.5 * points.section(p).sqrt(); D];
+    }
+}
+
+/// det F of what a domain has sides of: a ring's hoop is none.
+fn section_determinant<const D: usize>(gradient: &Matrix3<f64>) -> f64 {
+    match D {
+        2 => dense::determinant(&dense::block::<2>(gradient)),
+        _ => gradient.determinant(),
+    }
 }
 
 /// Half the extent of the side centres where F takes those of the initial domain: what the rule

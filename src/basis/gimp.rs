@@ -138,7 +138,7 @@ pub(crate) fn populated_cells<const D: usize>(
 /// `published`: the cells of the grid, where the hats of its outermost nodes fall to zero beyond it.
 /// `CENTRES`: the middle of a cell in the place of the overlap's.
 #[inline]
-fn fill<const CENTRES: bool>(
+pub(crate) fn fill<const CENTRES: bool>(
     line: &mut Line,
     span: Span,
     centre: f64,

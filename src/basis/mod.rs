@@ -9,6 +9,7 @@
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
 //! | `locking` | `centre.rs` | gradients at the centres of cells, for F-bar |
+//! | `symmetry` | `radial.rs` | rings: S, its gradient and S/r, weighted by the radius |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
@@ -18,6 +19,7 @@ pub mod gimp;
 pub mod groups;
 pub mod mpm;
 mod product;
+pub mod radial;
 
 #[cfg(test)]
 mod tests;
@@ -52,6 +54,10 @@ pub struct Influences<const D: usize> {
     pub gradients: Vec<[f64; D]>,
     /// Gradients at cell centres of the same entries ([`centre`]), 1/m; empty without F-bar.
     pub centre_gradients: Vec<[f64; D]>,
+    /// With axisymmetry the hoop row of the same entries ([`radial`]), 1/m: dF_zz - 1 = Σ H u_r.
+    pub hoop: Vec<f64>,
+    /// That of F-bar at cell centres, 1/m.
+    pub centre_hoop: Vec<f64>,
     /// Where the nodes come from, of bases that collect them place by place.
     pub cells: Cells,
 }
@@ -97,6 +103,8 @@ impl<const D: usize> Influences<D> {
             weights: Vec::with_capacity(entries),
             gradients: Vec::with_capacity(entries),
             centre_gradients: Vec::new(),
+            hoop: Vec::new(),
+            centre_hoop: Vec::new(),
             cells: Cells::default(),
         }
     }

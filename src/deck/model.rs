@@ -137,9 +137,21 @@ pub enum ElementPath {
     Strain,
 }
 
+/// What a problem in two dimensions stands for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Symmetry {
+    /// A slice of unit thickness that cannot stretch along z.
+    #[default]
+    PlaneStrain,
+    /// Half of a section through a body of revolution: x is the radius, y the axis. Volumes, masses,
+    /// forces and energies are those of the whole turn.
+    Axisymmetric,
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
     pub kind: AnalysisType,
+    pub symmetry: Symmetry,
     /// Equal load steps or time steps; `None` only with `cfl`.
     pub steps: Option<usize>,
     /// s; dynamics only.

@@ -114,6 +114,7 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     let a = &deck.analysis;
     w.table("[analysis]");
     w.line("analysis", "type", quote(a.kind.name()));
+    w.line("analysis", "symmetry", quote(a.symmetry.name()));
     w.optional("analysis", "steps", a.steps.map(|steps| steps.to_string()));
     w.optional("analysis", "duration", a.duration.map(number));
     w.optional("analysis", "cfl", a.cfl.map(number));

@@ -3,7 +3,7 @@
 use super::model::{
     AffineTransfer, AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame,
     GhostScaling, GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume,
-    PositionUpdate, StressUpdate, Tangent, VerifyNorm,
+    PositionUpdate, StressUpdate, Symmetry, Tangent, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -47,6 +47,7 @@ words! {
         "biaxial" => Biaxial,
         "strain" => Strain,
     }
+    Symmetry { "plane-strain" => PlaneStrain, "axisymmetric" => Axisymmetric }
     OnFailure { "stop" => Stop, "cut" => Cut }
     InvertedIterates { "reject" => Reject, "allow" => Allow }
     Tangent { "auto" => Auto, "unsymmetric" => Unsymmetric }

@@ -1,7 +1,7 @@
 //! J_G = (h^3/3) ∫ [[dN/dn]]^T [[dN/dn]] dΓ over one face (Ghost eq. 23, 28), scalar: the same
 //! for each displacement component.
 
-use crate::deck::model::{Ghost, GhostScaling};
+use crate::deck::model::{Ghost, GhostScaling, Symmetry};
 use crate::error::Result;
 use crate::grid::Grid;
 
@@ -44,13 +44,16 @@ impl Penalty {
 pub fn face_stencils<const D: usize>(
     grid: &Grid<D>,
     faces: &[BoundaryFace],
-    scaling: GhostScaling,
+    (scaling, symmetry): (GhostScaling, Symmetry),
     penalties: &[Penalty],
 ) -> Result<Vec<FaceStencil>> {
     faces
         .iter()
         .map(|face| {
-            let jump = grid.face_jump(face.pair)?;
+            let mut jump = grid.face_jump(face.pair)?;
+            if symmetry == Symmetry::Axisymmetric {
+                jump.turn();
+            }
             let count = jump.nodes.len();
             let h = jump.size;
             let mut matrix = vec![0.0; count * count];

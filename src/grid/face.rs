@@ -4,6 +4,8 @@
 //! is constant in sign over the face and points from the lower to the upper cell; reversing it
 //! changes the sign of the whole jump and leaves J_G alone.
 
+use std::f64::consts::TAU;
+
 use crate::error::{Error, Result};
 
 use super::element;
@@ -20,6 +22,8 @@ pub struct FaceJump {
     /// `nodes`, dN/dn in the upper cell minus dN/dn in the lower one, 1/m. Between simplices that
     /// share no face: one per axis, with the whole measure and the jump of dN along the axis.
     pub points: Vec<(f64, Vec<f64>)>,
+    /// x of each quadrature point, m: the radius with axisymmetry.
+    pub radii: Vec<f64>,
     /// h of Ghost eq. 16, m: the face's length (2D) or the square root of its area (3D).
     pub size: f64,
     /// Mean extent of the two cells along the face's normal, m.
@@ -28,6 +32,16 @@ pub struct FaceJump {
 
 /// Abscissae of the two-point Gauss rule on [0, 1]; both weights are 1/2.
 const GAUSS_UNIT: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
+
+impl FaceJump {
+    /// Makes it a face of a body of revolution about the axis x = 0: measures become those of the whole
+    /// turn, m^D.
+    pub fn turn(&mut self) {
+        for ((weight, _), radius) in self.points.iter_mut().zip(&self.radii) {
+            *weight *= TAU * radius;
+        }
+    }
+}
 
 impl<const D: usize> Grid<D> {
     /// Geometry of an interior face. Quadrature with two points per axis of the face, which is
@@ -72,7 +86,10 @@ fn lattice_jump<const D: usize>(lattice: &Lattice<D>, pair: FacePair) -> Result<
 
     let count = 1 << (D - 1);
     let mut points = Vec::with_capacity(count);
+    let mut radii = Vec::with_capacity(count);
     for gauss in 0..count {
+        let along = if axis == 0 { 1.0 } else { GAUSS_UNIT[gauss & 1] };
+        radii.push(lattice.origin[0] + lattice.spacing[0] * (low[0] as f64 + along));
         let jump = stencil.iter().map(|&(_, layer, corner)| {
             let on_face: f64 = tangents
                 .clone()
@@ -90,6 +107,7 @@ fn lattice_jump<const D: usize>(lattice: &Lattice<D>, pair: FacePair) -> Result<
     Ok(FaceJump {
         nodes: stencil.iter().map(|entry| entry.0).collect(),
         points,
+        radii,
         size: if D == 3 { area.sqrt() } else { area },
         cell_size: lattice.spacing[axis],
     })
@@ -125,6 +143,8 @@ fn mesh_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump>
 
     let rule = face_rule(element);
     let mut points = Vec::with_capacity(rule.len());
+    let radii = rule.iter().map(|(shape, ..)| shape.iter().zip(&x).map(|(n, x)| n * x[0]).sum());
+    let radii = radii.collect();
     let mut area = 0.0;
     let mut mean_normal = [0.0; D];
     for (shape, slopes, weight) in &rule {
@@ -168,6 +188,7 @@ fn mesh_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump>
     Ok(FaceJump {
         nodes: union.iter().map(|&n| n as usize).collect(),
         points,
+        radii,
         size: if D == 3 { area.sqrt() } else { area },
         cell_size: 0.5 * (extent[0] + extent[1]),
     })
@@ -187,13 +208,14 @@ fn node_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump>
     union.dedup();
     let mut jumps = vec![vec![0.0; union.len()]; D];
     // Of a right-angled simplex with legs h: det J = h^D.
-    let mut determinant = 0.0;
+    let (mut determinant, mut radius) = (0.0, 0.0);
     for (side, sign) in [(0, -1.0), (1, 1.0)] {
         let x = mesh.cell_positions(cells[side]);
         let centre = mesh.element.reference_centre();
         let (gradients, det) = element::gradients(mesh.element, &x[..=D], &centre)
             .ok_or_else(|| Error::Run(format!("cell {} of the mesh is flat", cells[side])))?;
         determinant += 0.5 * det;
+        radius += x[..=D].iter().map(|x| x[0]).sum::<f64>() / (2 * D + 2) as f64;
         for (&node, g) in nodes[side].iter().zip(&gradients) {
             let slot = union.partition_point(|&n| n < node);
             for (jump, g) in jumps.iter_mut().zip(g) {
@@ -206,6 +228,7 @@ fn node_jump<const D: usize>(mesh: &Mesh<D>, pair: FacePair) -> Result<FaceJump>
     Ok(FaceJump {
         nodes: union.iter().map(|&n| n as usize).collect(),
         points: jumps.into_iter().map(|jump| (area, jump)).collect(),
+        radii: vec![radius; D],
         size: if D == 3 { area.sqrt() } else { area },
         cell_size: leg,
     })

@@ -1,6 +1,6 @@
 //! F-bar: dF_bar = (det dF_0 / det dF)^(1/D) dF, the point's distortion with the change of volume at
 //! the centres of cells (de Souza Neto et al. 1996, IJSS 33:3277, eq. 8); in plane strain it acts in
-//! the plane only, where dF_zz = 1 stays.
+//! the plane only, where dF_zz = 1 stays. Rings (`ring.rs`) take all three directions.
 //!
 //! The material sees dF_bar: b_e and tau follow from it. Gradients, positions, domains and volumes
 //! follow dF, so that sigma = tau / det F is integrated over the true volume. With L = d(dF) dF^-1:
@@ -8,6 +8,7 @@
 //! [`super::contribution`] at dF_bar, the rest one product per point: dtau for L = 1 times
 //! (tr L_0 - tr L) / D. Without a counterpart in the rows it makes the tangent unsymmetric.
 
+use super::Increment;
 use crate::tensor::dense::{self, Square};
 use crate::tensor::spectral::ln_1p;
 
@@ -16,15 +17,26 @@ use crate::tensor::spectral::ln_1p;
 #[inline]
 pub fn averaged<const D: usize>(increment: &Square<D>, centre: &Square<D>) -> Square<D> {
     let [own, common] = [increment, centre].map(|h| ln_1p(dense::determinant_excess(h)));
-    let growth = ((common - own) / D as f64).exp_m1();
-    let mut averaged = *increment;
-    for (i, row) in averaged.iter_mut().enumerate() {
+    grown(increment, ((common - own) / D as f64).exp_m1())
+}
+
+/// ln det dF of a ring
+#[inline]
+pub(crate) fn logarithm<const D: usize>(increment: Increment<'_, D>) -> f64 {
+    ln_1p(dense::determinant_excess(increment.block)) + ln_1p(increment.hoop)
+}
+
+/// (1 + `growth`) dF - 1
+#[inline]
+pub(crate) fn grown<const D: usize>(increment: &Square<D>, growth: f64) -> Square<D> {
+    let mut grown = *increment;
+    for (i, row) in grown.iter_mut().enumerate() {
         for (j, value) in row.iter_mut().enumerate() {
             let whole = if i == j { 1.0 + *value } else { *value };
             *value += growth * whole;
         }
     }
-    averaged
+    grown
 }
 
 /// What F-bar adds to a point's tangent: K_aibk += (dS_a/dy_j) R_ij r_bk V.

@@ -11,9 +11,11 @@
 //! | `mod.rs` | what the assembly sees |
 //! | `update.rs` | trial strain, material, new elastic strain: in principal axes |
 //! | `dilation.rs` | F-bar: the change of volume at the centres of cells |
+//! | `ring.rs` | what the hoop direction adds with axisymmetry |
 //! | `tangent.rs` | from principal moduli to A_ijkl of a frame |
 
 pub mod dilation;
+pub mod ring;
 mod tangent;
 mod update;
 
@@ -23,6 +25,7 @@ mod paper_tests;
 mod tests;
 
 pub use dilation::Dilation;
+pub use ring::{Hoop, ring_contribution};
 pub use update::BATCH;
 
 use nalgebra::Matrix3;
@@ -60,6 +63,22 @@ pub struct StressState {
     pub state: [f64; MOST_STATE],
 }
 
+/// dF - 1 of a step.
+#[derive(Debug, Clone, Copy)]
+pub struct Increment<'a, const D: usize> {
+    /// Its rows and columns along the grid's axes: d(du)/dX~ (Lagrangian eq. 7).
+    pub block: &'a Square<D>,
+    /// For D = 2 dF_zz - 1: u_r / r with axisymmetry, zero in plane strain.
+    pub hoop: f64,
+}
+
+impl<'a, const D: usize> From<&'a Square<D>> for Increment<'a, D> {
+    #[inline(always)]
+    fn from(block: &'a Square<D>) -> Self {
+        Increment { block, hoop: 0.0 }
+    }
+}
+
 /// Inputs at a point that stay fixed during a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepStart<'a> {
@@ -77,18 +96,23 @@ pub struct StepStart<'a> {
 /// Stress only (explicit steps, last evaluation) for the increment dF - 1. det dF < 0 is taken as it comes; a singular
 /// or not finite dF gives stresses that are not finite.
 #[inline]
-pub fn stress<const D: usize>(start: &StepStart, increment: &[[f64; D]; D]) -> StressState {
-    update::update(start, increment).state(&start.material)
+pub fn stress<'a, const D: usize>(
+    start: &StepStart,
+    increment: impl Into<Increment<'a, D>>,
+) -> StressState {
+    update::update(start, increment.into()).state(&start.material)
 }
 
 /// [`stress`] of at most [`BATCH`] points at once, the same to the last bit: `start` gives the
-/// state of each before the step, `out` takes the one after it.
+/// state of each before the step, `out` takes the one after it. `hoops`: dF_zz - 1 with axisymmetry,
+/// else empty.
 pub fn stresses<'a, const D: usize>(
     start: impl Fn(usize) -> StepStart<'a>,
     increments: &[[[f64; D]; D]],
+    hoops: &[f64],
     out: &mut [StressState],
 ) {
-    update::states(start, increments, out);
+    update::states(start, increments, hoops, out);
 }
 
 /// Stress and tangent in `frame` for the increment dF - 1 = d(du)/dX~ (Lagrangian eq. 7).
@@ -99,16 +123,9 @@ pub fn contribution<const D: usize>(
     start: &StepStart,
     increment: &[[f64; D]; D],
 ) -> (Contribution<D>, StressState) {
-    let update = update::update(start, increment);
-    let placement = Placement::new(frame, start, &dense::plus_unit(increment));
-    let (stress, tangent) = tangent::pull_back(&update, &placement.back, placement.scale);
-    let contribution = Contribution {
-        stress,
-        tangent,
-        gradient_map: placement.gradient_map,
-        volume: placement.volume,
-    };
-    (contribution, update.state(&start.material))
+    let update = update::update(start, increment.into());
+    let placement = Placement::new(frame, start, &dense::plus_unit(increment), 1.0);
+    (placement.contribution(&update), update.state(&start.material))
 }
 
 /// [`contribution`] with F-bar: `centre` is dF_0 - 1. The stress, its part of the tangent and the
@@ -120,16 +137,10 @@ pub fn averaged_contribution<const D: usize>(
     increment: &[[f64; D]; D],
     centre: &[[f64; D]; D],
 ) -> (Contribution<D>, Dilation<D>, StressState) {
-    let update = update::update(start, &dilation::averaged(increment, centre));
-    let placement = Placement::new(frame, start, &dense::plus_unit(increment));
-    let (stress, tangent) = tangent::pull_back(&update, &placement.back, placement.scale);
+    let update = update::update(start, (&dilation::averaged(increment, centre)).into());
+    let placement = Placement::new(frame, start, &dense::plus_unit(increment), 1.0);
+    let contribution = placement.contribution(&update);
     let rate = tangent::expansion(&update, &placement.back, placement.scale);
-    let contribution = Contribution {
-        stress,
-        tangent,
-        gradient_map: placement.gradient_map,
-        volume: placement.volume,
-    };
     let dilation = Dilation::new(rate, increment, centre);
     (contribution, dilation, update.state(&start.material))
 }
@@ -145,15 +156,16 @@ struct Placement<const D: usize> {
 }
 
 impl<const D: usize> Placement<D> {
+    /// Of the increment dF; `out_of_plane` is dF_zz for D = 2.
     #[inline]
-    fn new(frame: Frame, start: &StepStart, increment: &Square<D>) -> Self {
+    fn new(frame: Frame, start: &StepStart, increment: &Square<D>, out_of_plane: f64) -> Self {
         let start_gradient = dense::block::<D>(start.deformation_gradient);
+        let start_zz = if D == 2 { start.deformation_gradient[(2, 2)] } else { 1.0 };
         let (inverse, det) = dense::inverse(increment);
+        let start_det = dense::determinant(&start_gradient) * start_zz;
         let (back, gradient_map, ratio) = match frame {
-            Frame::Previous => (inverse, dense::identity(), dense::determinant(&start_gradient)),
-            Frame::Updated => {
-                (dense::identity(), inverse, det * dense::determinant(&start_gradient))
-            }
+            Frame::Previous => (inverse, dense::identity(), start_det),
+            Frame::Updated => (dense::identity(), inverse, det * out_of_plane * start_det),
             Frame::Total => {
                 let (start_inverse, _) = dense::inverse(&start_gradient);
                 (dense::multiply(&start_inverse, &inverse), start_gradient, 1.0)
@@ -161,5 +173,12 @@ impl<const D: usize> Placement<D> {
         };
         let volume = ratio * start.volume_initial;
         Placement { back, scale: 1.0 / ratio, gradient_map, volume }
+    }
+
+    #[inline(always)]
+    fn contribution(&self, update: &update::Update) -> Contribution<D> {
+        let (stress, tangent) = tangent::pull_back(update, &self.back, self.scale);
+        let (gradient_map, volume) = (self.gradient_map, self.volume);
+        Contribution { stress, tangent, gradient_map, volume }
     }
 }

@@ -85,6 +85,24 @@ pub(crate) fn expansion<const D: usize>(
     rate
 }
 
+/// s_h H_jm dtau_im for L_zz = 1, and s_h H_ln dtau_zz for L_kn, `scale` s_h with the dy/dx of the
+/// hoop: A_ijzz and A_zzkl of a ring.
+#[inline]
+pub(crate) fn coupling<const D: usize>(
+    update: &Update,
+    back: &Square<D>,
+    scale: f64,
+) -> (Square<D>, Square<D>) {
+    let (mut from, mut onto) = ([[0.0; D]; D], [[0.0; D]; D]);
+    for a in 0..D {
+        let here: [f64; D] = std::array::from_fn(|i| update.trial.axes[a][i]);
+        let there: [f64; D] = std::array::from_fn(|j| dot(&back[j], &here));
+        add(&mut from, scale * update.response.tangent[a][2], &here, &there);
+        add(&mut onto, scale * update.response.tangent[2][a], &here, &there);
+    }
+    (from, onto)
+}
+
 /// r_ab = (tau_a - tau_b) / (b_a - b_b), exact also where the values coincide.
 #[inline]
 fn shear_rate(update: &Update, a: usize, b: usize) -> f64 {

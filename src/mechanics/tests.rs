@@ -433,7 +433,7 @@ fn a_batch_gives_each_point_what_it_gets_alone() {
                 (0..count).map(|k| Case::random(material(k), k as u64, 0.02 * k as f64)).collect();
             let increments: Vec<Square<D>> = cases.iter().map(Case::moved).collect();
             let mut states = [StressState::default(); BATCH];
-            stresses(|k| cases[k].start(), &increments, &mut states);
+            stresses(|k| cases[k].start(), &increments, &[], &mut states);
             for (case, state) in cases.iter().zip(&states) {
                 assert_eq!(*state, stress(&case.start(), &case.moved()));
             }

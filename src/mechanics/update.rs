@@ -6,7 +6,7 @@
 
 use nalgebra::Matrix3;
 
-use super::{StepStart, StressState};
+use super::{Increment, StepStart, StressState};
 use crate::material::{LocalMaterial, Response};
 use crate::tensor::Spectrum;
 use crate::tensor::dense::{self, Square};
@@ -27,7 +27,8 @@ pub const BATCH: usize = 16;
 /// Principal values and axes of dF b dF^T - 1 from e = b - 1 (`before`) and h = dF - 1
 /// (`increment`): with a = dF b - 1 = h + e + h e it is a + h^T + a h^T.
 #[inline(always)]
-fn trial<const D: usize>(before: &Matrix3<f64>, increment: &Square<D>) -> Spectrum {
+fn trial<const D: usize>(before: &Matrix3<f64>, increment: Increment<'_, D>) -> Spectrum {
+    let Increment { block: increment, hoop } = increment;
     let mut half = dense::multiply(increment, &dense::block::<D>(before));
     for (i, row) in half.iter_mut().enumerate() {
         for (j, value) in row.iter_mut().enumerate() {
@@ -37,14 +38,15 @@ fn trial<const D: usize>(before: &Matrix3<f64>, increment: &Square<D>) -> Spectr
     let row =
         |i: usize, j: usize| half[i][j] + increment[j][i] + dense::dot(&half[i], &increment[j]);
     if D == 2 {
-        Spectrum::plane(row(0, 0), row(1, 1), row(0, 1), before[(2, 2)])
+        let zz = before[(2, 2)];
+        Spectrum::plane(row(0, 0), row(1, 1), row(0, 1), zz + hoop * (2.0 + hoop) * (1.0 + zz))
     } else {
         Spectrum::space([row(0, 0), row(1, 1), row(2, 2)], [row(1, 2), row(0, 2), row(0, 1)])
     }
 }
 
 #[inline(always)]
-pub(crate) fn update<const D: usize>(start: &StepStart, increment: &Square<D>) -> Update {
+pub(crate) fn update<const D: usize>(start: &StepStart, increment: Increment<'_, D>) -> Update {
     let trial = trial(start.elastic_excess, increment);
     let logarithms = trial.values.map(ln_1p);
     let response = start.material.respond(logarithms.map(|e| 0.5 * e), start.state);
@@ -84,14 +86,16 @@ fn elastic_values(trial: &Spectrum, response: &Response) -> [f64; 3] {
 pub(crate) fn states<'a, const D: usize>(
     start: impl Fn(usize) -> StepStart<'a>,
     increments: &[Square<D>],
+    hoops: &[f64],
     out: &mut [StressState],
 ) {
     const NONE: Spectrum = Spectrum { values: [0.0; 3], axes: [[0.0; 3]; 3] };
     let mut trials = [NONE; BATCH];
     let trials = &mut trials[..increments.len()];
     let (mut stresses, mut values) = ([[0.0; 3]; BATCH], [[0.0; 3]; BATCH]);
-    for (k, (trial_of, increment)) in trials.iter_mut().zip(increments).enumerate() {
-        *trial_of = trial(start(k).elastic_excess, increment);
+    for (k, (trial_of, block)) in trials.iter_mut().zip(increments).enumerate() {
+        let hoop = hoops.get(k).copied().unwrap_or(0.0);
+        *trial_of = trial(start(k).elastic_excess, Increment { block, hoop });
     }
     for (strain, trial) in values.iter_mut().zip(&*trials) {
         *strain = trial.values.map(ln_1p);

@@ -4,16 +4,16 @@ use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::SimpleCommunicator;
 
 use super::summary::{BodySummary, PeakMemory};
-use crate::deck::model::Basis;
+use crate::deck::model::{Basis, Symmetry};
 use crate::points::Points;
 
 /// Position, extent, mass and volume of bodies 0..`bodies`. The extent is x_p -/+ l_p, with
-/// l_p = V_p^(1/D)/2 of the current volume for `mpm`, which carries no domain. A body that no
+/// l_p = V_p^(1/D)/2 of the current volume (of a ring: A^(1/2)/2 of its section) for `mpm`, which carries no domain. A body that no
 /// rank has a point of has empty vectors.
 pub fn body_summaries<const D: usize>(
     points: &Points<D>,
     bodies: usize,
-    basis: Basis,
+    (basis, symmetry): (Basis, Symmetry),
     comm: &SimpleCommunicator,
 ) -> Vec<BodySummary> {
     // Per body: minus the lower bounds and the upper bounds, so that one maximum serves all.
@@ -22,7 +22,10 @@ pub fn body_summaries<const D: usize>(
     for p in 0..points.len() {
         let body = points.body[p] as usize;
         let volume = points.volume(p);
-        let side = volume.powf(1.0 / D as f64) / 2.0;
+        let side = match symmetry {
+            Symmetry::PlaneStrain => volume.powf(1.0 / D as f64) / 2.0,
+            Symmetry::Axisymmetric => points.section(p).sqrt() / 2.0,
+        };
         let bound = &mut bounds[body * 4 * D..][..4 * D];
         for axis in 0..D {
             let x = points.position[p][axis];

@@ -21,7 +21,7 @@ use super::tables::history::History;
 use super::tables::history::{HistoryRow, Layout, Reaction};
 use super::tables::residuals::Residuals;
 use super::terminal::log::Log;
-use crate::deck::model::{Basis, Element};
+use crate::deck::model::{Basis, Element, Symmetry};
 use crate::error::Error;
 use crate::points::Points;
 
@@ -138,7 +138,7 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
     series.cut(comm).unwrap();
     series.write(5, 0.5, &points, comm).unwrap();
 
-    let bodies = body_summaries(&points, 3, basis, comm);
+    let bodies = body_summaries(&points, 3, (basis, Symmetry::PlaneStrain), comm);
     assert_eq!(bodies[0].min, std::array::from_fn::<_, D, _>(|axis| [0.5, 0.25, 0.5][axis]));
     assert!((bodies[0].extent_min[0] - 0.4).abs() < 1e-15);
     let total = point_count(comm.size() as usize) as f64;

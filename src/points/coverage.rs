@@ -4,6 +4,8 @@
 //! integrated by Gauss's rule on panels that end at the shape's corners and are halved until the
 //! volume settles. Polygons come out exact, round shapes to the tolerance.
 
+use std::f64::consts::TAU;
+
 use crate::deck::shape::Form;
 use crate::deck::{Shape, Side};
 
@@ -227,6 +229,16 @@ pub fn volume<const D: usize>(shape: &Shape) -> Option<f64> {
         coverage.along_line(&at, &centre, &half).volume
     });
     Some(lines.sum::<f64>() / (LINES * LINES) as f64 * whole)
+}
+
+/// Volume of the whole turn of a section in the plane about the axis x = 0, m3: 2π ∫ x dA.
+pub fn volume_of_turn(section: &Shape) -> Option<f64> {
+    let (low, high) = section.bounds()?;
+    let centre: [f64; 2] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+    let half: [f64; 2] = std::array::from_fn(|axis| 0.5 * (high[axis] - low[axis]));
+    let moments = Coverage::new(section).of(&centre, &half);
+    let area = 4.0 * half[0] * half[1];
+    Some(TAU * area * (centre[0] * moments.volume + half[0] * moments.first[0]))
 }
 
 /// Half the integral from `low` to `high`: three points, exact for polynomials of degree five.

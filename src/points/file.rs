@@ -1,9 +1,10 @@
 //! Points from a csv file: header `x,y[,z],volume[,vx,vy,vz]`, one point per line.
 
+use std::f64::consts::TAU;
 use std::io::Read;
 use std::path::Path;
 
-use crate::deck::model::{Basis, Body, Deck};
+use crate::deck::model::{Basis, Body, Deck, Symmetry};
 use crate::deck::{figure, nearest, rough};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -57,6 +58,11 @@ pub fn read_points<const D: usize>(
         _ => f64::INFINITY,
     };
 
+    let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
+    let width_of = |x: &[f64; D], volume: f64| {
+        let section = if rings { volume / (TAU * x[0]) } else { volume };
+        section.powf(1.0 / D as f64)
+    };
     let mut rows = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| match error.position() {
@@ -74,11 +80,17 @@ pub fn read_points<const D: usize>(
         for (value, &at) in x.iter_mut().zip(&columns.places) {
             *value = number(at)?;
         }
+        if rings && x[0] <= 0.0 {
+            return Err(wrong(
+                line(),
+                format!("radius {} must be positive: x is the radius", x[0]),
+            ));
+        }
         let volume = number(columns.volume)?;
         if volume <= 0.0 {
             return Err(wrong(line(), format!("volume {volume} must be positive")));
         }
-        let width = volume.powf(1.0 / D as f64);
+        let width = width_of(&x, volume);
         if width > widest * (1.0 + SLACK) {
             let what = format!(
                 "volume {} is that of a domain of width {} m, expected at most the cell size {} \
@@ -110,7 +122,7 @@ pub fn read_points<const D: usize>(
     }
     for row in share.of(rows.len()) {
         let (x, volume, velocity) = rows[row];
-        let half = [0.5 * volume.powf(1.0 / D as f64); D];
+        let half = [0.5 * width_of(&x, volume); D];
         let id = first_id + row as u64;
         points.push_unstrained(id, index as u32, x, volume, body.density, half);
         *points.velocity.last_mut().expect("a point was just pushed") = velocity;

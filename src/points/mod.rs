@@ -25,6 +25,8 @@ pub mod share;
 pub mod sort;
 mod sub_cells;
 
+use std::f64::consts::TAU;
+
 use former::Former;
 use gather::{Gather, Moves};
 use nalgebra::Matrix3;
@@ -266,6 +268,22 @@ impl<const D: usize> Points<D> {
     /// V = det F V0 of the last finished step, m3.
     pub fn volume(&self, p: usize) -> f64 {
         self.deformation_gradient[p].determinant() * self.volume_initial[p]
+    }
+
+    /// Area of a ring's section, V / (2π r), m2.
+    pub fn section(&self, p: usize) -> f64 {
+        let hoop = self.deformation_gradient[p][(2, 2)];
+        self.volume(p) / (TAU * self.position_initial[p][0] * hoop)
+    }
+
+    /// Makes rings of the points from `first` on: volumes and masses of the section become those of the
+    /// whole turn about the axis x = 0 (Pappus: 2π times the radius of the section's centroid).
+    pub fn turn(&mut self, first: usize) {
+        for p in first..self.len() {
+            let around = TAU * self.position_initial[p][0];
+            self.volume_initial[p] *= around;
+            self.mass[p] *= around;
+        }
     }
 
     /// Principal elastic logarithmic strains of the last finished step.

@@ -2,7 +2,7 @@
 //! the partition will be; identities depend on the deck alone, so that a run looks the same on
 //! any number of ranks.
 
-use crate::deck::model::{Body, BodySource, Deck, Seeding};
+use crate::deck::model::{Body, BodySource, Deck, Seeding, Symmetry};
 use crate::deck::{Scope, Shape};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
@@ -59,6 +59,12 @@ pub fn seed<const D: usize>(
             }
         };
         first_id += candidates;
+        // A file's volumes are those of the whole turn.
+        if deck.analysis.symmetry == Symmetry::Axisymmetric
+            && !matches!(body.source, BodySource::File(_))
+        {
+            points.turn(made);
+        }
         // A file may have velocities of its own.
         if !matches!(body.source, BodySource::File(_)) || moves(body) {
             set_velocity(&mut points, made, body);
@@ -69,6 +75,7 @@ pub fn seed<const D: usize>(
 
 /// Makes any points of the bodies that are seeded cell by cell on a mesh.
 pub struct CellByCell<'a, const D: usize> {
+    symmetry: Symmetry,
     bodies: Vec<Option<CellSeeding<'a, D>>>,
     first_ids: Vec<u64>,
 }
@@ -86,7 +93,7 @@ impl<'a, const D: usize> CellByCell<'a, D> {
             }
         };
         let bodies = deck.bodies.iter().enumerate().map(of).collect::<Result<_>>()?;
-        Ok(CellByCell { bodies, first_ids })
+        Ok(CellByCell { symmetry: deck.analysis.symmetry, bodies, first_ids })
     }
 
     pub fn bodies(&self) -> usize {
@@ -110,6 +117,9 @@ impl<'a, const D: usize> CellByCell<'a, D> {
         if let Some(cells) = &self.bodies[body] {
             let made = points.len();
             cells.run(points, share, wanted, self.first_ids[body]);
+            if self.symmetry == Symmetry::Axisymmetric {
+                points.turn(made);
+            }
             set_velocity(points, made, cells.body);
         }
     }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use crate::deck::Deck;
-use crate::deck::model::{AnalysisType, Every};
+use crate::deck::model::{AnalysisType, Every, Symmetry};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::directory::ResultsDirectory;
@@ -167,6 +167,7 @@ impl Recorder {
             opening;
         let comm = world.comm();
         let layout = Layout {
+            whole: deck.analysis.symmetry == Symmetry::Axisymmetric,
             dimension: deck.dimension,
             boundaries: deck.boundaries.iter().map(|boundary| boundary.name.clone()).collect(),
             conditioning: deck.analysis.kind == AnalysisType::Conditioning,
@@ -581,7 +582,8 @@ impl Recorder {
         closing: Closing<'_>,
     ) -> (Summary, Result<()>) {
         let Closing { communication, verify, ending } = closing;
-        let bodies = body_summaries(points, deck.bodies.len(), deck.method.basis, world.comm());
+        let kind = (deck.method.basis, deck.analysis.symmetry);
+        let bodies = body_summaries(points, deck.bodies.len(), kind, world.comm());
         let summary = Summary {
             title: deck.title.clone(),
             status: ending.status,

@@ -1,7 +1,7 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
 use crate::deck::fields::{self, FieldRank};
-use crate::deck::model::{Basis, Body, BodySource};
+use crate::deck::model::{Basis, Body, BodySource, Symmetry};
 use crate::deck::rough;
 use crate::output::terminal::report::Plan;
 use crate::parallel::World;
@@ -106,10 +106,14 @@ fn filling<const D: usize>(
     for (volume, &body) in points.volume_initial.iter().zip(&points.body) {
         seeded[body as usize] += volume;
     }
-    let unit = if D == 2 { "m2" } else { "m3" };
+    let rings = model.deck.analysis.symmetry == Symmetry::Axisymmetric;
+    let unit = if D == 2 && !rings { "m2" } else { "m3" };
     let row = |(body, seeded): (&Body, f64)| {
         let BodySource::Shape { shape, .. } = &body.source else { return None };
-        let exact = coverage::volume::<D>(shape)?;
+        let exact = match rings {
+            true => coverage::volume_of_turn(shape)?,
+            false => coverage::volume::<D>(shape)?,
+        };
         let off = seeded / exact - 1.0;
         let text = format!(
             "points fill {} {unit}, the shape has {} {unit}{}",

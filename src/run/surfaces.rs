@@ -1,14 +1,16 @@
 //! Surfaces of a deck at the start: their elements, and the points that carry them.
 
+use std::f64::consts::TAU;
+
 use crate::deck::Deck;
-use crate::deck::model::{BodySource, BodySurface, Held};
+use crate::deck::model::{BodySource, BodySurface, Held, Symmetry};
 use crate::deck::shape::Shape;
 use crate::error::{Error, Result};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::surface::of_shape::{self, Part};
 use crate::surface::sheet::Sheet;
-use crate::surface::{Surface, carriers};
+use crate::surface::{Element, Surface, carriers};
 use crate::system::supports::Support;
 
 /// A part of a body's own surface; `key`: where the deck asks for it. Collective. Error: nothing of the
@@ -25,9 +27,10 @@ pub fn of_body<const D: usize>(
     let Some(shape) = shape_of(deck, wanted.body) else {
         return Err(wrong(&format!("body \"{}\" is not given as a shape", body.name)));
     };
-    let spacing = carriers::spacing(world, points, wanted.body);
+    let symmetry = deck.analysis.symmetry;
+    let spacing = carriers::spacing(world, points, wanted.body, symmetry);
     let part = Part { side: wanted.side, within: wanted.within.as_ref() };
-    let elements = of_shape::elements::<D>(shape, part, spacing);
+    let elements = turned(of_shape::elements::<D>(shape, part, spacing), symmetry);
     if elements.is_empty() {
         return Err(wrong(&format!(
             "no part of the surface of body \"{}\" is there: side and where leave nothing of it",
@@ -75,8 +78,9 @@ fn on_sheet<const D: usize>(
     let mut all = Vec::new();
     for body in 0..deck.bodies.len() {
         let Some(shape) = shape_of(deck, body) else { continue };
-        let spacing = carriers::spacing(world, points, body);
-        let elements = sheet.elements(shape, spacing, slip);
+        let symmetry = deck.analysis.symmetry;
+        let spacing = carriers::spacing(world, points, body, symmetry);
+        let elements = turned(sheet.elements(shape, spacing, slip), symmetry);
         let what = format!("body \"{}\"", deck.bodies[body].name);
         let carried = carriers::carried(world, points, body, &elements, spacing, &what);
         let carried =
@@ -89,6 +93,18 @@ fn on_sheet<const D: usize>(
         return Err(Error::Input(deck.places.say(key, why)));
     }
     Ok(Surface::new(all))
+}
+
+/// With axisymmetry the areas are those of the whole turn; what lies on the axis has none.
+fn turned<const D: usize>(mut elements: Vec<Element<D>>, symmetry: Symmetry) -> Vec<Element<D>> {
+    if symmetry == Symmetry::Axisymmetric {
+        let furthest = elements.iter().map(|e| e.place[0]).fold(0.0, f64::max);
+        elements.retain(|e| e.place[0] > 1e-12 * furthest);
+        for Element { place, area } in &mut elements {
+            area.iter_mut().for_each(|a| *a *= TAU * place[0]);
+        }
+    }
+    elements
 }
 
 fn shape_of(deck: &Deck, body: usize) -> Option<&Shape> {

@@ -2,9 +2,12 @@
 //! near ones the one with the smallest id. It depends on the start alone, so that a restart finds the
 //! same one.
 
+use std::f64::consts::TAU;
+
 use rustc_hash::FxHashMap;
 
 use super::{Carried, Element};
+use crate::deck::model::Symmetry;
 use crate::error::{Error, Result};
 use crate::parallel::World;
 use crate::points::Points;
@@ -15,10 +18,19 @@ const REACH: i64 = 2;
 const EQUAL: f64 = 1e-9;
 
 /// Mean distance of a body's points, m. Collective.
-pub fn spacing<const D: usize>(world: &World, points: &Points<D>, body: usize) -> f64 {
+pub fn spacing<const D: usize>(
+    world: &World,
+    points: &Points<D>,
+    body: usize,
+    symmetry: Symmetry,
+) -> f64 {
     let own = (0..points.len()).filter(|&p| points.body[p] as usize == body);
-    let (count, volume) =
-        own.fold((0, 0.0), |(count, volume), p| (count + 1, volume + points.volume_initial[p]));
+    // Of a ring its section counts.
+    let size = |p: usize| match symmetry {
+        Symmetry::PlaneStrain => points.volume_initial[p],
+        Symmetry::Axisymmetric => points.volume_initial[p] / (TAU * points.position_initial[p][0]),
+    };
+    let (count, volume) = own.fold((0, 0.0), |(count, volume), p| (count + 1, volume + size(p)));
     let count = world.sum_usize(count);
     (world.sum(volume) / count.max(1) as f64).powf(1.0 / D as f64)
 }

@@ -123,6 +123,39 @@ impl Conditions {
     }
 }
 
+impl Conditions {
+    /// Holds x of the nodes on the axis x = 0 of a body of revolution, where u_r / r has no other value
+    /// that stays finite. Their reaction is nobody's: it acts on a ring of no radius. Collective. Error:
+    /// a boundary of the deck moves one off the axis.
+    pub fn hold_axis<const D: usize>(
+        &mut self,
+        world: &World,
+        grid: &Grid<D>,
+        numbering: &Numbering,
+    ) -> Result<()> {
+        let slack = 1e-9 * grid.cell_size();
+        let mut problem = None;
+        for (local, &node) in numbering.nodes.iter().enumerate() {
+            let x = grid.node_position(node);
+            if x[0].abs() > slack {
+                continue;
+            }
+            if self.increment[local * D] != 0.0 {
+                problem.get_or_insert(format!(
+                    "a boundary moves x of the node at {x:?} by {} in this step, off the axis x = 0 of a \
+                     body of revolution, which keeps its place; let the boundary leave the node out",
+                    self.increment[local * D]
+                ));
+            }
+            self.fixed[local * D] = true;
+        }
+        match world.first_message(problem) {
+            Some(problem) => Err(Error::Input(problem)),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Which local nodes lie in `place`.
 fn members<const D: usize>(
     world: &World,

@@ -2,7 +2,7 @@
 //! products of a batch of points are summed in registers, tile by tile, and go straight into
 //! the sparse rows. The plain form is in `internal.rs`; a test compares the two.
 
-use crate::mechanics::Contribution;
+use crate::mechanics::{Contribution, Hoop};
 use crate::tensor::fused::multiply_add;
 
 use super::places::Place;
@@ -23,6 +23,8 @@ pub(crate) struct Batch {
     nodes: usize,
     /// Columns of a row, filled up to whole tiles.
     stride: usize,
+    /// Rows of a point: one per axis, and with axisymmetry one for the hoop.
+    depth: usize,
     points: usize,
     capacity: usize,
     /// g_aj: row (p, j), column a.
@@ -34,16 +36,17 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Starts a group of points on `nodes` nodes.
+    /// Starts a group of points on `nodes` nodes; `rings`: each has a hoop, too.
     #[inline(always)]
-    pub fn start<const D: usize>(&mut self, nodes: usize) {
+    pub fn start<const D: usize>(&mut self, nodes: usize, rings: bool) {
         self.nodes = nodes;
         self.stride = (nodes * D).next_multiple_of(NARROW);
+        self.depth = D + usize::from(rings);
         self.points = 0;
-        self.capacity = (BATCH_VALUES / (D * D * self.stride)).max(1);
+        self.capacity = (BATCH_VALUES / (D * self.depth * self.stride)).max(1);
         // Columns beyond the last node are never read back; they only have to exist.
-        grow(&mut self.gradients, self.capacity * D * nodes);
-        grow(&mut self.flux, self.capacity * D * D * self.stride);
+        grow(&mut self.gradients, self.capacity * self.depth * nodes);
+        grow(&mut self.flux, self.capacity * D * self.depth * self.stride);
         grow(&mut self.strip, TALL * self.stride);
     }
 
@@ -62,20 +65,21 @@ impl Batch {
         gradients: &[[f64; D]],
         contribution: &Contribution<D>,
     ) {
-        let (nodes, stride, p) = (self.nodes, self.stride, self.points);
+        let (nodes, stride) = (self.nodes, self.stride);
+        let first = self.points * self.depth;
         self.points += 1;
         for j in 0..D {
-            let row = &mut self.gradients[(p * D + j) * nodes..(p * D + j + 1) * nodes];
+            let row = &mut self.gradients[(first + j) * nodes..(first + j + 1) * nodes];
             for (target, gradient) in row.iter_mut().zip(gradients) {
                 *target = gradient[j];
             }
         }
-        let plane = self.capacity * D * stride;
+        let plane = self.capacity * self.depth * stride;
         for i in 0..D {
             for j in 0..D {
                 let tangent =
                     contribution.tangent[i][j].map(|row| row.map(|v| v * contribution.volume));
-                let start = i * plane + (p * D + j) * stride;
+                let start = i * plane + (first + j) * stride;
                 let row = &mut self.flux[start..start + nodes * D];
                 for (target, gradient) in row.chunks_exact_mut(D).zip(gradients) {
                     for k in 0..D {
@@ -98,14 +102,67 @@ impl Batch {
         rate: &[[f64; D]; D],
         row: &[[f64; D]],
     ) {
-        let (stride, p) = (self.stride, self.points - 1);
-        let plane = self.capacity * D * stride;
+        let (stride, first) = (self.stride, (self.points - 1) * self.depth);
+        let plane = self.capacity * self.depth * stride;
         for i in 0..D {
             for j in 0..D {
-                let start = i * plane + (p * D + j) * stride;
+                let start = i * plane + (first + j) * stride;
                 let flux = &mut self.flux[start..start + self.nodes * D];
                 for (target, factors) in flux.iter_mut().zip(row.as_flattened()) {
                     *target = multiply_add::<FUSED>(rate[i][j], *factors, *target);
+                }
+            }
+        }
+    }
+
+    /// Adds the hoop of the point pushed last ([`Hoop`]), `rows` and `gradients` in the frame, `volume`
+    /// in m3. `swelling`: R_zz V and the row r of F-bar.
+    #[inline(always)]
+    pub fn push_hoop<const D: usize, const FUSED: bool>(
+        &mut self,
+        rows: &[f64],
+        gradients: &[[f64; D]],
+        hoop: &Hoop<D>,
+        volume: f64,
+        swelling: Option<(f64, &[[f64; D]])>,
+    ) {
+        let (nodes, stride) = (self.nodes, self.stride);
+        let first = (self.points - 1) * self.depth;
+        let plane = self.capacity * self.depth * stride;
+        self.gradients[(first + D) * nodes..(first + D + 1) * nodes].copy_from_slice(rows);
+        // What a hoop strain does to the section.
+        for i in 0..D {
+            for j in 0..D {
+                let start = i * plane + (first + j) * stride;
+                let flux = &mut self.flux[start..start + nodes * D];
+                let modulus = hoop.from[i][j] * volume;
+                for (target, row) in flux.chunks_exact_mut(D).zip(rows) {
+                    target[0] = multiply_add::<FUSED>(modulus, *row, target[0]);
+                }
+            }
+        }
+        // The hoop's stress acts along the radius alone.
+        let onto = hoop.onto.map(|row| row.map(|v| v * volume));
+        for i in 0..D {
+            let start = i * plane + (first + D) * stride;
+            let flux = &mut self.flux[start..start + nodes * D];
+            if i > 0 {
+                flux.fill(0.0);
+                continue;
+            }
+            for ((target, gradient), row) in flux.chunks_exact_mut(D).zip(gradients).zip(rows) {
+                for k in 0..D {
+                    let mut sum = onto[k][0] * gradient[0];
+                    for l in 1..D {
+                        sum = multiply_add::<FUSED>(onto[k][l], gradient[l], sum);
+                    }
+                    target[k] = sum;
+                }
+                target[0] = multiply_add::<FUSED>(hoop.own * volume, *row, target[0]);
+            }
+            if let Some((rate, row)) = swelling {
+                for (target, factor) in flux.iter_mut().zip(row.as_flattened()) {
+                    *target = multiply_add::<FUSED>(rate, *factor, *target);
                 }
             }
         }
@@ -120,12 +177,12 @@ impl Batch {
         rows: &[(usize, usize)],
         values: &mut R,
     ) {
-        if self.points == 1 {
+        if self.points == 1 && self.depth == D {
             return self.flush_one::<D, FUSED, R>(place, rows, values);
         }
-        let depth = self.points * D;
+        let depth = self.points * self.depth;
         self.points = 0;
-        let plane = self.capacity * D * self.stride;
+        let plane = self.capacity * self.depth * self.stride;
         for i in 0..D {
             let flux = &self.flux[i * plane..i * plane + depth * self.stride];
             let mut a = 0;

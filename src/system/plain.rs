@@ -3,11 +3,14 @@
 //! with.
 
 use crate::deck::model::Frame;
+use crate::mechanics::Increment;
 
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 use super::scatter::BlockMatrix;
-use super::terms::stress::{StepPoints, displacement_gradient, respond, respond_averaged};
+use super::terms::stress::{
+    StepPoints, displacement_gradient, hoop_increment, respond, respond_averaged, respond_ring,
+};
 use super::terms::term::Health;
 
 /// As [`crate::system::terms::stress::assemble`], to rounding.
@@ -31,7 +34,14 @@ pub fn assemble<const D: usize>(
             std::array::from_fn(|i| displacement[nodes[a] as usize * D + i])
         };
         let increment = displacement_gradient(gradients, nodal);
-        let centres = step.influences.centre_gradients.get(row).unwrap_or_default();
+        let centres = step.influences.centre_gradients.get(row.clone()).unwrap_or_default();
+        if !step.influences.hoop.is_empty() {
+            let block = ring(step, frame, p, nodes, displacement, force, &mut health);
+            if let Some(block) = block {
+                stiffness.add(numbering, pattern, nodes, &block);
+            }
+            continue;
+        }
         let made = if centres.is_empty() {
             respond(step, frame, p, &increment, &mut health).map(|made| (made, None))
         } else {
@@ -73,4 +83,76 @@ pub fn assemble<const D: usize>(
         stiffness.add(numbering, pattern, nodes, &block);
     }
     health
+}
+
+/// A ring's force and dense block, entry (a, i, b, k), by B = (g_0, g_1, s): dF = Σ_b B_b u_b with the hoop
+/// as a third direction along which only u_0 counts.
+fn ring<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    nodes: &[u32],
+    displacement: &[f64],
+    force: &mut [f64],
+    health: &mut Health,
+) -> Option<Vec<f64>> {
+    let row = step.influences.row(p);
+    let nodal =
+        |a: usize| -> [f64; D] { std::array::from_fn(|i| displacement[nodes[a] as usize * D + i]) };
+    let increment = |gradients: &[[f64; D]], hoops: &[f64]| {
+        (displacement_gradient(gradients, nodal), hoop_increment(hoops, nodal))
+    };
+    let (gradients, hoops) =
+        (&step.influences.gradients[row.clone()], &step.influences.hoop[row.clone()]);
+    let (block, hoop) = increment(gradients, hoops);
+    let centres = step.influences.centre_gradients.get(row.clone());
+    let centre_hoops = step.influences.centre_hoop.get(row).unwrap_or_default();
+    let middle = centres.map(|centres| increment(centres, centre_hoops));
+    let own = Increment { block: &block, hoop };
+    let middle = middle.as_ref().map(|(block, hoop)| Increment { block, hoop: *hoop });
+    let (made, ring) = respond_ring(step, frame, p, own, middle, health)?;
+    let mapped = |a: usize, j: usize| -> f64 {
+        (0..D).map(|i| gradients[a][i] * made.gradient_map[i][j]).sum()
+    };
+    let (count, volume) = (nodes.len(), made.volume);
+    let mut block = vec![0.0; (count * D) * (count * D)];
+    for a in 0..count {
+        let s_a = hoops[a] * ring.map;
+        force[nodes[a] as usize * D] += ring.stress * s_a * volume;
+        for i in 0..D {
+            for j in 0..D {
+                force[nodes[a] as usize * D + i] += made.stress[i][j] * mapped(a, j) * volume;
+            }
+            for b in 0..count {
+                let s_b = hoops[b] * ring.map;
+                for k in 0..D {
+                    let mut sum = 0.0;
+                    for j in 0..D {
+                        for l in 0..D {
+                            sum += mapped(a, j) * made.tangent[i][j][k][l] * mapped(b, l);
+                        }
+                        if k == 0 {
+                            sum += mapped(a, j) * ring.from[i][j] * s_b;
+                        }
+                        if i == 0 {
+                            sum += s_a * ring.onto[k][j] * mapped(b, j);
+                        }
+                    }
+                    if i == 0 && k == 0 {
+                        sum += s_a * ring.own * s_b;
+                    }
+                    if let (Some(swelling), Some(centres)) = (&ring.swelling, centres) {
+                        let own = (&gradients[b], hoops[b]);
+                        let r = swelling.row(own, (&centres[b], centre_hoops[b]))[k];
+                        sum += (0..D).map(|j| mapped(a, j) * swelling.rate[i][j] * r).sum::<f64>();
+                        if i == 0 {
+                            sum += s_a * swelling.hoop_rate * r;
+                        }
+                    }
+                    block[((a * D + i) * count + b) * D + k] += sum * volume;
+                }
+            }
+        }
+    }
+    Some(block)
 }

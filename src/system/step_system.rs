@@ -11,7 +11,7 @@ use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use super::terms::surface;
 use crate::basis::{self, Groups, Influences};
-use crate::deck::model::{Basis, Locking, PointVolume};
+use crate::deck::model::{Basis, Locking, PointVolume, Symmetry};
 use crate::error::Result;
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
 use crate::grid::{FacePair, Grid};
@@ -73,7 +73,7 @@ impl<const D: usize> Discretisation<D> {
         span: StepSpan,
     ) -> Result<(Self, Conditions)> {
         let mesh = Self::with_coupling(world, model, points, coupling)?;
-        let conditions = Conditions::evaluate(
+        let mut conditions = Conditions::evaluate(
             world,
             &model.grid,
             model.deck.method.basis,
@@ -82,6 +82,9 @@ impl<const D: usize> Discretisation<D> {
             &model.deck.boundaries,
             span,
         )?;
+        if model.deck.analysis.symmetry == Symmetry::Axisymmetric {
+            conditions.hold_axis(world, &model.grid, &mesh.numbering)?;
+        }
         Ok((mesh, conditions))
     }
 
@@ -105,6 +108,10 @@ impl<const D: usize> Discretisation<D> {
             let edge = model.deck.method.gimp_edge;
             let centres = basis::centre::gradients(grid, basis, edge, points, &influences);
             influences.centre_gradients = world.fail_together(centres)?;
+        }
+        if model.deck.analysis.symmetry == Symmetry::Axisymmetric {
+            let turned = basis::radial::turn(grid, basis, points, &mut influences);
+            world.fail_together(turned)?;
         }
         let groups = Groups::new(&influences);
         let kinds = (basis, model.deck.bodies.len());
@@ -271,11 +278,12 @@ pub(crate) fn find_faces<const D: usize>(
     populated: &Populated,
 ) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
     let Some(ghost) = &model.deck.ghost else { return Ok((Vec::new(), Vec::new())) };
+    let kind = (ghost.scaling, model.deck.analysis.symmetry);
     let groups = std::iter::once(&populated.owned).chain(&populated.further);
     let mut found: Vec<(FacePair, FaceStencil)> = Vec::new();
     for (cells, penalties) in groups.zip(model.penalties.chunks(GROUP)) {
         let faces = boundary_faces(world, &model.grid, &model.partition, cells)?;
-        let stencils = face_stencils(&model.grid, &faces, ghost.scaling, penalties);
+        let stencils = face_stencils(&model.grid, &faces, kind, penalties);
         let stencils = world.fail_together(stencils)?;
         found.extend(faces.iter().map(|face| face.pair).zip(stencils));
     }

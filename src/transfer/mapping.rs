@@ -11,6 +11,14 @@ use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 use crate::tensor::dense;
 
+/// dF - 1 of points.
+#[derive(Debug, Clone, Default)]
+pub struct Deformation<const D: usize> {
+    pub blocks: Vec<Square<D>>,
+    /// dF_zz - 1 of rings; empty without axisymmetry.
+    pub hoops: Vec<f64>,
+}
+
 /// Σ_p m S^T v (Ghost eq. 10), kg m/s.
 pub fn momentum<const D: usize>(
     step: StepPoints<'_, D>,
@@ -43,11 +51,12 @@ pub fn add_momentum<const D: usize>(
 
 /// Σ_p S^T f - ∇S^T σ V (Ghost eq. 6), N, with σ V = τ V0. `external` is the force on each
 /// point, empty for none. `increments` holds dF - 1 since the gradients were computed, empty for
-/// none: the gradients are then those of the deformed state, ∇S dF^-1.
+/// none: the gradients are then those of the deformed state, ∇S dF^-1. Rings add -τ_zz V0 H / dF_zz
+/// along the radius.
 pub fn force<const D: usize>(
     step: StepPoints<'_, D>,
     external: &[[f64; D]],
-    increments: &[Square<D>],
+    increments: &Deformation<D>,
     nodes: usize,
 ) -> Vec<[f64; D]> {
     let mut sums = vec![[0.0; D]; nodes];
@@ -60,16 +69,17 @@ pub fn add_force<const D: usize>(
     step: StepPoints<'_, D>,
     part: Range<usize>,
     external: &[[f64; D]],
-    increments: &[Square<D>],
+    increments: &Deformation<D>,
     sums: &mut [[f64; D]],
 ) {
     let points = step.points;
+    add_hoop_force(step, part.clone(), &increments.hoops, sums);
     for p in part {
         let volume = points.volume_initial[p];
         let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
         // Row i of τ V0 dF^-T: what the gradient is multiplied with.
         let mut flux = stress.map(|row| row.map(|s| s * volume));
-        if let Some(increment) = increments.get(p) {
+        if let Some(increment) = increments.blocks.get(p) {
             let (inverse, _) = dense::inverse(&dense::plus_unit(increment));
             flux = dense::multiply_transposed(&flux, &inverse);
         }
@@ -95,6 +105,7 @@ pub fn add_momentum_and_force<const D: usize>(
     forces: &mut [[f64; D]],
 ) {
     let points = step.points;
+    add_hoop_force(step, part.clone(), &[], forces);
     for p in part {
         let volume = points.volume_initial[p];
         let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
@@ -110,6 +121,27 @@ pub fn add_momentum_and_force<const D: usize>(
                 momentum[i] += weight * carried[i];
                 force[i] += weight * own[i] - dense::dot(&flux[i], gradient);
             }
+        }
+    }
+}
+
+/// -Σ_p H τ_zz V0 / dF_zz along the radius, of rings; `hoops`: dF_zz - 1 since H was computed.
+fn add_hoop_force<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    hoops: &[f64],
+    sums: &mut [[f64; D]],
+) {
+    if step.influences.hoop.is_empty() {
+        return;
+    }
+    let points = step.points;
+    for p in part {
+        let since = 1.0 + hoops.get(p).copied().unwrap_or(0.0);
+        let force = points.kirchhoff_stress[p][(2, 2)] * points.volume_initial[p] / since;
+        let rows = &step.influences.hoop[step.influences.row(p)];
+        for (&node, row) in step.nodes_of(p).iter().zip(rows) {
+            sums[node as usize][0] -= row * force;
         }
     }
 }
@@ -200,12 +232,55 @@ pub fn at_points<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<
         .collect()
 }
 
-/// dF - 1 = Σ_v u ∇S at each point (Lagrangian eq. 7).
+/// What the places of the points move by: [`at_points`], of rings with the mean that is not weighted by
+/// the radius ([`crate::basis::radial`]).
+pub fn places<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<[f64; D]> {
+    match step.influences.hoop.is_empty() {
+        true => at_points(step, nodal),
+        false => places_of_rings(step, nodal),
+    }
+}
+
+/// Σ_v H u / Σ_v H at each ring.
+pub(super) fn places_of_rings<const D: usize>(
+    step: StepPoints<'_, D>,
+    nodal: &[f64],
+) -> Vec<[f64; D]> {
+    let of_point = |p: usize| {
+        let (mut sum, mut whole) = ([0.0; D], 0.0);
+        let rows = &step.influences.hoop[step.influences.row(p)];
+        for (&node, row) in step.nodes_of(p).iter().zip(rows) {
+            let value = &nodal[node as usize * D..node as usize * D + D];
+            whole += row;
+            for i in 0..D {
+                sum[i] += row * value[i];
+            }
+        }
+        sum.map(|sum| sum / whole)
+    };
+    (0..step.points.len()).map(of_point).collect()
+}
+
+/// dF_zz - 1 = Σ_v H u_r at each ring; empty without axisymmetry.
+pub fn hoop_increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64]) -> Vec<f64> {
+    if step.influences.hoop.is_empty() {
+        return Vec::new();
+    }
+    let of_point = |p: usize| {
+        let rows = &step.influences.hoop[step.influences.row(p)];
+        let moved = step.nodes_of(p).iter().map(|&node| displacement[node as usize * D]);
+        moved.zip(rows).map(|(u, row)| row * u).sum()
+    };
+    (0..step.points.len()).map(of_point).collect()
+}
+
+/// dF - 1 = Σ_v u ∇S at each point (Lagrangian eq. 7), with the hoop of rings.
 pub fn displacement_gradients<const D: usize>(
     step: StepPoints<'_, D>,
     displacement: &[f64],
-) -> Vec<Square<D>> {
-    (0..step.points.len())
+) -> Deformation<D> {
+    let hoops = hoop_increments(step, displacement);
+    let blocks = (0..step.points.len())
         .map(|p| {
             let mut increment = [[0.0; D]; D];
             let gradients = &step.influences.gradients[step.influences.row(p)];
@@ -219,7 +294,8 @@ pub fn displacement_gradients<const D: usize>(
             }
             increment
         })
-        .collect()
+        .collect();
+    Deformation { blocks, hoops }
 }
 
 #[cfg(test)]
@@ -272,7 +348,7 @@ mod tests {
                     add_momentum_and_force(step, part, external, &mut momenta, &mut forces);
                 }
                 assert_eq!(momenta, momentum(step, &points.velocity, nodes));
-                assert_eq!(forces, force(step, external, &[], nodes));
+                assert_eq!(forces, force(step, external, &Deformation::default(), nodes));
             }
             let (a, v) = (at_points(step, &acceleration), at_points(step, &velocity));
             for share in [1.0, 0.4, 0.0] {

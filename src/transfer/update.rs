@@ -5,22 +5,23 @@ use std::cell::Cell;
 
 use nalgebra::Matrix3;
 
-use crate::basis::domain::update_domains;
+use crate::basis::domain::{update_domains, update_sections};
 use crate::basis::{cpdi1, cpdi2};
 use crate::deck::figure;
-use crate::deck::model::{Basis, Boundary, DomainUpdate, Place};
+use crate::deck::model::{Basis, Boundary, DomainUpdate, Place, Symmetry};
 use crate::deck::schema::{AXES, SIDES};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::material::{Material, local};
-use crate::mechanics::{self, BATCH, StepStart, StressState, dilation};
+use crate::mechanics::{self, BATCH, Increment, StepStart, StressState, dilation, ring};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::model::Model;
 use crate::system::numbering::Numbering;
-use crate::system::terms::stress::{StepPoints, displacement_gradient};
+use crate::system::terms::stress::{StepPoints, displacement_gradient, hoop_increment};
 use crate::tensor::dense;
 
+use super::mapping::{self, Deformation};
 use super::refusal::{Cause, Refusal};
 use crate::points::Snapshot;
 use crate::points::former::Former;
@@ -28,9 +29,9 @@ use crate::points::former::Former;
 /// Increments at each point of this rank, computed but not yet applied.
 pub struct Increments<const D: usize> {
     /// dF - 1
-    pub deformation: Vec<[[f64; D]; D]>,
+    pub deformation: Deformation<D>,
     /// dF_bar - 1, what stress and b_e follow; empty without F-bar, where dF does it.
-    pub averaged: Vec<[[f64; D]; D]>,
+    pub averaged: Deformation<D>,
     /// m
     pub displacement: Vec<[f64; D]>,
     /// Where the corners of `cpdi2` domains go, m; empty until [`require_sound_domains`] has found it.
@@ -39,9 +40,17 @@ pub struct Increments<const D: usize> {
 
 impl<const D: usize> Increments<D> {
     /// Of dF - 1 and dF_bar - 1 the one that stress and b_e follow.
-    pub fn straining(&self) -> &[[[f64; D]; D]] {
-        if self.averaged.is_empty() { &self.deformation } else { &self.averaged }
+    pub fn straining(&self) -> &Deformation<D> {
+        straining(&self.deformation, &self.averaged)
     }
+}
+
+/// Of dF - 1 and dF_bar - 1, which is empty without F-bar, the one that stress and b_e follow.
+pub fn straining<'a, const D: usize>(
+    deformation: &'a Deformation<D>,
+    averaged: &'a Deformation<D>,
+) -> &'a Deformation<D> {
+    if averaged.blocks.is_empty() { deformation } else { averaged }
 }
 
 /// Energies of this rank's points, J (J/m in plane strain).
@@ -57,8 +66,8 @@ pub struct PointEnergies {
 pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64]) -> Increments<D> {
     let count = step.points.len();
     let mut made = Increments {
-        deformation: Vec::with_capacity(count),
-        averaged: Vec::new(),
+        deformation: Deformation { blocks: Vec::with_capacity(count), hoops: Vec::new() },
+        averaged: Deformation::default(),
         displacement: Vec::with_capacity(count),
         corners: Vec::new(),
     };
@@ -70,6 +79,7 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
             std::array::from_fn(|i| displacement[start + i])
         };
         made.deformation
+            .blocks
             .push(displacement_gradient(&step.influences.gradients[row.clone()], nodal));
         let mut moved = [0.0; D];
         for (a, weight) in step.influences.weights[row].iter().enumerate() {
@@ -79,6 +89,10 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
         }
         made.displacement.push(moved);
     }
+    if !step.influences.hoop.is_empty() {
+        made.deformation.hoops = mapping::hoop_increments(step, displacement);
+        made.displacement = mapping::places_of_rings(step, displacement);
+    }
     made.averaged = averaged(step, displacement, &made.deformation);
     made
 }
@@ -87,21 +101,31 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
 pub fn averaged<const D: usize>(
     step: StepPoints<'_, D>,
     displacement: &[f64],
-    deformation: &[[[f64; D]; D]],
-) -> Vec<[[f64; D]; D]> {
+    deformation: &Deformation<D>,
+) -> Deformation<D> {
     let centres = &step.influences.centre_gradients;
+    let mut made = Deformation::default();
     if centres.is_empty() {
-        return Vec::new();
+        return made;
     }
-    let of_point = |(p, increment): (usize, &[[f64; D]; D])| {
-        let nodes = step.nodes_of(p);
-        let centre = displacement_gradient(&centres[step.influences.row(p)], |a| {
+    for (p, increment) in deformation.blocks.iter().enumerate() {
+        let (nodes, row) = (step.nodes_of(p), step.influences.row(p));
+        let nodal = |a: usize| -> [f64; D] {
             let start = nodes[a] as usize * D;
             std::array::from_fn(|i| displacement[start + i])
-        });
-        dilation::averaged(increment, &centre)
-    };
-    deformation.iter().enumerate().map(of_point).collect()
+        };
+        let centre = displacement_gradient(&centres[row.clone()], nodal);
+        let Some(&hoop) = deformation.hoops.get(p) else {
+            made.blocks.push(dilation::averaged(increment, &centre));
+            continue;
+        };
+        let centre_hoop = hoop_increment(&step.influences.centre_hoop[row], nodal);
+        let own = Increment { block: increment, hoop };
+        let (block, hoop) = ring::averaged(own, Increment { block: &centre, hoop: centre_hoop });
+        made.blocks.push(block);
+        made.hoops.push(hoop);
+    }
+    made
 }
 
 /// How a refusal says that no boundary keeps points from leaving through a side.
@@ -124,8 +148,7 @@ pub fn require_sound<const D: usize>(
         if moved.iter().any(|m| !m.is_finite()) {
             return Some(Fault::NotFinite);
         }
-        let averaged = increments.averaged.get(p);
-        let fault = fault_of(&increments.deformation[p], averaged);
+        let fault = fault_of(p, &increments.deformation, &increments.averaged);
         fault.or_else(|| {
             near.set(grid.locate_near(&moved, near.get()));
             let leaves =
@@ -173,10 +196,10 @@ fn way_out<const D: usize>(grid: &Grid<D>, boundaries: &[Boundary], place: &[f64
 pub fn require_sound_deformation<const D: usize>(
     world: &World,
     points: &Points<D>,
-    deformation: &[[[f64; D]; D]],
-    averaged: &[[[f64; D]; D]],
+    deformation: &Deformation<D>,
+    averaged: &Deformation<D>,
 ) -> std::result::Result<(), Refusal> {
-    require(world, points, |p| fault_of(&deformation[p], averaged.get(p)))
+    require(world, points, |p| fault_of(p, deformation, averaged))
 }
 
 /// What is wrong with the increment of a point.
@@ -191,18 +214,22 @@ enum Fault {
 }
 
 fn fault_of<const D: usize>(
-    increment: &[[f64; D]; D],
-    averaged: Option<&[[f64; D]; D]>,
+    p: usize,
+    deformation: &Deformation<D>,
+    averaged: &Deformation<D>,
 ) -> Option<Fault> {
-    let determinant = dense::determinant(&dense::plus_unit(increment));
-    if !determinant.is_finite() {
+    let hoop = 1.0 + deformation.hoops.get(p).copied().unwrap_or(0.0);
+    let section = dense::determinant(&dense::plus_unit(&deformation.blocks[p]));
+    if !(section * hoop).is_finite() {
         return Some(Fault::NotFinite);
     }
-    if determinant <= 0.0 {
-        return Some(Fault::Inverted(determinant));
+    if section <= 0.0 || hoop <= 0.0 {
+        return Some(Fault::Inverted(section * hoop));
     }
     let finite = |h: &[[f64; D]; D]| h.as_flattened().iter().all(|v| v.is_finite());
-    averaged.is_some_and(|h| !finite(h)).then_some(Fault::Centre)
+    let unsound = averaged.blocks.get(p).is_some_and(|h| !finite(h))
+        || averaged.hoops.get(p).is_some_and(|h| !h.is_finite());
+    unsound.then_some(Fault::Centre)
 }
 
 /// Refuses the first point of the lowest rank with a fault. Collective.
@@ -271,7 +298,7 @@ pub fn require_sound_domains<const D: usize>(
             increments.corners.push(cpdi2::moved_corners(grids, points, p, &mut hint, &nodal)?);
             return Ok(());
         }
-        let increment = dense::plus_unit(&increments.deformation[p]);
+        let increment = dense::plus_unit(&increments.deformation.blocks[p]);
         let moved = &increments.displacement[p];
         cpdi1::check_step(after, points, p, &increment, moved, &mut hint)
     };
@@ -313,7 +340,7 @@ pub fn apply<const D: usize>(
 
 /// F of the increments dF - 1 alone: what [`follow`] reads.
 pub fn stretch<const D: usize>(
-    increments: &[[[f64; D]; D]],
+    increments: &Deformation<D>,
     points: &mut Points<D>,
     before: Option<&mut Snapshot<D>>,
 ) {
@@ -331,9 +358,12 @@ pub fn stretch<const D: usize>(
     overwrite(
         &mut points.deformation_gradient,
         before.map(|before| &mut before.deformation_gradient),
-        increments,
+        &increments.blocks,
         after,
     );
+    for (gradient, hoop) in points.deformation_gradient.iter_mut().zip(&increments.hoops) {
+        gradient[(2, 2)] += hoop * gradient[(2, 2)];
+    }
 }
 
 /// Each value of an array from the old one and what it meets in `with`.
@@ -362,7 +392,7 @@ fn overwrite<T: Copy, W>(
 /// new state, all but the kinetic one.
 pub fn respond<const D: usize>(
     materials: &[Material],
-    increments: &[[[f64; D]; D]],
+    increments: &Deformation<D>,
     points: &mut Points<D>,
     mut before: Option<&mut Snapshot<D>>,
 ) -> PointEnergies {
@@ -376,8 +406,9 @@ pub fn respond<const D: usize>(
     let before = before.as_deref();
     let mut sum = PointEnergies::default();
     let mut states = [StressState::default(); BATCH];
-    for (batch, increments) in increments.chunks(BATCH).enumerate() {
+    for (batch, blocks) in increments.blocks.chunks(BATCH).enumerate() {
         let first = batch * BATCH;
+        let hoops = increments.hoops.get(first..first + blocks.len()).unwrap_or_default();
         let elastic = match before {
             Some(before) => before.elastic_excess.values(),
             None => &points.elastic_excess,
@@ -395,8 +426,8 @@ pub fn respond<const D: usize>(
             elastic_excess: &elastic[first + k],
             volume_initial: points.volume_initial[first + k],
         };
-        mechanics::stresses(start, increments, &mut states);
-        for (p, state) in (first..first + increments.len()).zip(&states) {
+        mechanics::stresses(start, blocks, hoops, &mut states);
+        for (p, state) in (first..first + blocks.len()).zip(&states) {
             let (strain, lost) = match before {
                 Some(before) => (before.plastic_strain.values()[p], before.dissipation.values()[p]),
                 None => (points.plastic_strain[p], points.dissipation[p]),
@@ -435,9 +466,15 @@ pub fn follow<const D: usize>(
         points.corners.copy_from_slice(&increments.corners);
     }
     let whole: Vec<Matrix3<f64>> = match rule {
-        DomainUpdate::NormalIncremental => increments.deformation.iter().map(embed).collect(),
+        DomainUpdate::NormalIncremental => {
+            increments.deformation.blocks.iter().map(embed).collect()
+        }
         _ => Vec::new(),
     };
+    if basis == Basis::Mpm && model.deck.analysis.symmetry == Symmetry::Axisymmetric {
+        update_sections(points);
+        return Ok(0);
+    }
     let nodal = |node| nodal_displacement(numbering, displacement, node);
     update_domains(&model.grid, basis, rule, points, &whole, &nodal)
 }

@@ -13,7 +13,7 @@ use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
     AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
     Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate,
-    Tangent, VerifyNorm,
+    Symmetry, Tangent, VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -62,6 +62,9 @@ pub const SECTIONS: &[Section] = &[
         doc: "What is solved, and in which steps.",
         keys: &[
             key("type", Choice(AnalysisType::NAMES), Required, "Kind of analysis."),
+            key("symmetry", Choice(Symmetry::NAMES), Default("\"plane-strain\""),
+                "What a problem in two dimensions stands for. plane-strain: a slice of unit thickness. axisymmetric: half of a section through a body of revolution, x the radius (not below 0) and y the axis; zz is the hoop direction. Volumes, masses, forces, reactions and energies are those of the whole turn, and grid nodes on the axis keep x = 0. Bases mpm and gimp.")
+                .read_by(&[ON_GRID]),
             key("steps", Count, Optional("needed, except with cfl and in element tests"),
                 "Equal load steps or time steps.").range(at_least(1.0)),
             key("duration", Number, Optional("needed by dynamics, only there"),
@@ -170,7 +173,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "grid",
         header: "[grid]",
-        doc: "Background grid. Its vectors set the dimension of the problem: two components mean plane strain.",
+        doc: "Background grid. Its vectors set the dimension of the problem: two components mean plane strain, or axisymmetry (`analysis.symmetry`).",
         keys: &[
             key("type", Choice(&["lattice", "mesh"]), Required,
                 "Equal boxes, or an unstructured mesh."),

@@ -12,6 +12,7 @@ use super::ghost::Wanted;
 
 pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
     let kind: Got<AnalysisType> = table.choice("type");
+    let symmetry = table.choice("symmetry");
     let steps = table.count_if("steps");
     let duration = table.number_if("duration");
     let cfl = table.number_if("cfl");
@@ -46,6 +47,7 @@ pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
     timing?;
     Ok(Analysis {
         kind,
+        symmetry: symmetry?,
         steps: steps?,
         duration: duration?,
         cfl: cfl?,

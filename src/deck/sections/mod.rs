@@ -3,6 +3,7 @@
 //! | file | sections |
 //! |---|---|
 //! | `analysis.rs` | analysis, method, conditioning |
+//! | `axisymmetry.rs` | what a body of revolution cannot have |
 //! | `element_test.rs` | element_test, and a deck of nothing else |
 //! | `ghost.rs` | ghost, and what is in force without it |
 //! | `grid.rs` | grid |
@@ -17,6 +18,7 @@
 //! | `petsc.rs` | petsc |
 
 mod analysis;
+mod axisymmetry;
 mod bodies;
 mod conditions;
 mod element_test;
@@ -109,5 +111,6 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         grid,
     };
     grid::make_finite_elements(&root, &mut deck)?;
+    axisymmetry::check(&root, &deck)?;
     Ok(deck)
 }

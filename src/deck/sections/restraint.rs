@@ -1,6 +1,6 @@
 //! Whether boundary conditions hold the bodies: a quasi-static system without them is singular.
 
-use crate::deck::model::{Analysis, AnalysisType, Boundary, Load};
+use crate::deck::model::{Analysis, AnalysisType, Boundary, Load, Symmetry};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::AXES;
@@ -17,8 +17,10 @@ pub fn check(
         return Ok(());
     }
     let held = |axis: usize| {
+        // Rings resist what would stretch their hoops.
+        let hoops = axis == 0 && analysis.symmetry == Symmetry::Axisymmetric;
         let floats = loads.iter().any(|load| load.may_hold(axis));
-        floats || boundaries.iter().any(|boundary| boundary.may_hold(axis))
+        hoops || floats || boundaries.iter().any(|boundary| boundary.may_hold(axis))
     };
     let free: Vec<&str> =
         (0..dimension).filter(|axis| !held(*axis)).map(|axis| AXES[axis]).collect();

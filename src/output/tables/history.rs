@@ -12,6 +12,8 @@ use crate::output::terminal::log::Log;
 pub struct Layout {
     /// 2 or 3: plane strain has its forces, energies and momenta per metre of thickness.
     pub dimension: usize,
+    /// Two dimensions stand for a whole body, not for a slice of it: axisymmetry.
+    pub whole: bool,
     /// Names of the deck's boundary entries, in deck order.
     pub boundaries: Vec<String>,
     /// A conditioning run.
@@ -92,7 +94,7 @@ pub struct Conditioning {
 
 /// Name, unit and value of every column: the one place where they are paired.
 fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
-    let plane = layout.dimension == 2;
+    let plane = layout.dimension == 2 && !layout.whole;
     let unit = |volume, area| if plane { area } else { volume };
     let (force, energy) = (unit("N", "N/m"), unit("J", "J/m"));
     let (momentum, angular) = (unit("kg m/s", "kg/s"), unit("kg m2/s", "kg m/s"));
@@ -197,7 +199,7 @@ mod tests {
 
     #[test]
     fn the_columns_of_a_plane_strain_run() {
-        let layout = Layout { dimension: 2, boundaries: vec!["root".into()], conditioning: false };
+        let layout = Layout { dimension: 2, boundaries: vec!["root".into()], ..Layout::default() };
         assert_eq!(
             header(&layout).join(","),
             "step [-],load_factor [-],time [s],dt [s],newton_iterations [-],residual [-],\
@@ -213,8 +215,12 @@ mod tests {
 
     #[test]
     fn values_stand_under_their_names() {
-        let layout =
-            Layout { dimension: 3, boundaries: vec!["a".into(), "b".into()], conditioning: true };
+        let layout = Layout {
+            dimension: 3,
+            whole: false,
+            boundaries: vec!["a".into(), "b".into()],
+            conditioning: true,
+        };
         let reaction = Reaction { force: [1.0, 2.0, 3.0], sum_abs: 4.0, torque: 5.0, held: 8.0 };
         let row = HistoryRow {
             step: 12,

@@ -3,7 +3,7 @@
 
 use crate::deck::Scope;
 use crate::deck::figure;
-use crate::deck::model::{AnalysisType, Deck, Load, Place};
+use crate::deck::model::{AnalysisType, Deck, Load, Place, Symmetry};
 use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -199,6 +199,12 @@ fn boundaries<const D: usize>(
         let alone = std::slice::from_ref(boundary);
         let basis = deck.method.basis;
         let found = Conditions::evaluate(world, grid, basis, numbering, points, alone, span);
+        let found = found.and_then(|found| {
+            if deck.analysis.symmetry == Symmetry::Axisymmetric {
+                found.clone().hold_axis(world, grid, numbering)?;
+            }
+            Ok(found)
+        });
         let found = found.map_err(|error| match error {
             Error::Input(text) => {
                 Error::Input(deck.places.say(&format!("boundary.{index}.displacement"), &text))

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 
 use crate::basis;
-use crate::deck::model::Load;
+use crate::deck::model::{Load, Symmetry};
 use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
 use crate::ghost::FaceStencil;
@@ -106,8 +106,11 @@ fn loose<const D: usize>(
         first,
     )?;
     // Water that holds a body along an axis mostly rights it, too.
-    let springs: [bool; D] =
-        std::array::from_fn(|axis| deck.loads.iter().any(|load| load.may_hold(axis)));
+    // A body of revolution is held along the radius, and against turns, by its own hoops.
+    let hoops = deck.analysis.symmetry == Symmetry::Axisymmetric;
+    let springs: [bool; D] = std::array::from_fn(|axis| {
+        (hoops && axis == 0) || deck.loads.iter().any(|load| load.may_hold(axis))
+    });
     let pieces = pieces::labels(world, grid, populated, &faces, numbering)?;
     let (middle, length) = extent(world, points);
     let motions = D + D * (D - 1) / 2;

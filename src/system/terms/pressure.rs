@@ -4,6 +4,8 @@
 //! With g = ∇S at the current state, V = J V0, q = ∇p and H = ∇∇p at the current place x + S u,
 //! the tangent of -f is
 //! K_aibk = V [p (g_ai g_bk - g_ak g_bi) + g_ai q_k S_b + S_a q_i g_bk + S_a H_ik S_b].
+//! Rings have the hoop row s in the trace, f_a0 -= V p s_a, and J their hoop: with θ_ai = g_ai + s_a δ_i0 it is
+//! K_aibk = V [p (θ_ai θ_bk - g_ak g_bi - s_a s_b δ_i0 δ_k0) + θ_ai q_k S_b + S_a q_i θ_bk + S_a H_ik S_b].
 //! It equals its transposed: -f is the gradient of Σ V p. All state is that of the iterate, so that
 //! the frame in which stresses are written does not matter.
 
@@ -17,7 +19,7 @@ use crate::system::scatter::{BlockMatrix, BlockRows};
 use crate::tensor::dense;
 
 use super::block::add_block;
-use super::stress::{StepPoints, displacement_gradient, start_volume};
+use super::stress::{StepPoints, displacement_gradient, hoop_increment, start_volume};
 use super::term::{At, Part};
 
 /// The pressures of a deck at one moment.
@@ -111,16 +113,23 @@ impl<'a> PressureTerm<'a> {
         }
         let increment = displacement_gradient(&step.influences.gradients[row.clone()], moved);
         let (inverse, determinant) = dense::inverse(&dense::plus_unit(&increment));
-        let volume =
-            determinant * points.deformation_gradient[p].determinant() * start_volume(step, p);
-        let gradients: Vec<[f64; D]> = step.influences.gradients[row]
+        let gradients: Vec<[f64; D]> = step.influences.gradients[row.clone()]
             .iter()
             .map(|g| std::array::from_fn(|i| (0..D).map(|j| g[j] * inverse[j][i]).sum()))
             .collect();
+        let rows = step.influences.hoop.get(row).unwrap_or_default();
+        let turned = 1.0 + hoop_increment(rows, moved);
+        // Rows of the trace: the gradients, and those of rings with the hoop.
+        let mut traces = gradients.clone();
+        traces.iter_mut().zip(rows).for_each(|(trace, hoop)| trace[0] += hoop / turned);
+        let volume = determinant
+            * turned
+            * points.deformation_gradient[p].determinant()
+            * start_volume(step, p);
         let (value, slope) = (volume * found.value, found.first.map(|q| volume * q));
-        for (a, (weight, gradient)) in weights.iter().zip(&gradients).enumerate() {
+        for (a, (weight, trace)) in weights.iter().zip(&traces).enumerate() {
             for i in 0..D {
-                force[nodes[a] as usize * D + i] -= value * gradient[i] + weight * slope[i];
+                force[nodes[a] as usize * D + i] -= value * trace[i] + weight * slope[i];
             }
         }
         if block.is_empty() {
@@ -132,11 +141,15 @@ impl<'a> PressureTerm<'a> {
             for i in 0..D {
                 let line = &mut block[(a * D + i) * count * D..(a * D + i + 1) * count * D];
                 for (b, (of_b, h)) in weights.iter().zip(&gradients).enumerate() {
+                    let (t, u) = (&traces[a], &traces[b]);
                     for k in 0..D {
-                        line[b * D + k] += value * (g[i] * h[k] - g[k] * h[i])
-                            + g[i] * slope[k] * of_b
-                            + of_a * slope[i] * h[k]
+                        line[b * D + k] += value * (t[i] * u[k] - g[k] * h[i])
+                            + t[i] * slope[k] * of_b
+                            + of_a * slope[i] * u[k]
                             + of_a * curvature[i][k] * of_b;
+                    }
+                    if i == 0 {
+                        line[b * D] -= value * (t[0] - g[0]) * (u[0] - h[0]);
                     }
                 }
             }

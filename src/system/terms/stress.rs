@@ -1,12 +1,12 @@
 //! f_int = Σ_p ∇S^T T V and K = Σ_p ∇S^T A ∇S V (Lagrangian eq. 20-23, 27, 28), one dense block
-//! per group of points that share their nodes.
+//! per group of points that share their nodes. With axisymmetry the hoop joins: [`mechanics::ring`].
 
 use std::ops::Range;
 
 use crate::basis::{Groups, Influences};
 use crate::deck::model::{Frame, PointVolume};
 use crate::material::{Material, local};
-use crate::mechanics::{self, Contribution, Dilation, StepStart, StressState};
+use crate::mechanics::{self, Contribution, Dilation, Hoop, Increment, StepStart, StressState};
 use crate::points::Points;
 use crate::tensor::dense;
 use crate::tensor::fused::{self, multiply_add};
@@ -96,10 +96,16 @@ impl<const D: usize> Term<D> for Stress<'_, D> {
                 .zip(gradients)
                 .map(|(&node, gradient)| moved[node as usize] * norm(gradient))
                 .sum();
-            let strain = strain + points.elastic_excess[p].norm();
+            let hoops = step.influences.hoop.get(step.influences.row(p)).unwrap_or_default();
+            let turned: f64 =
+                around.iter().zip(hoops).map(|(&node, hoop)| moved[node as usize] * hoop).sum();
+            let strain = strain + turned + points.elastic_excess[p].norm();
             let force = modulus * strain * points.volume(p).abs();
             for (&node, gradient) in around.iter().zip(gradients) {
                 size[node as usize] += force * norm(gradient);
+            }
+            for (&node, hoop) in around.iter().zip(hoops) {
+                size[node as usize] += force * hoop;
             }
         }
     }
@@ -173,6 +179,9 @@ struct Workspace<const D: usize> {
     displacement: Vec<[f64; D]>,
     force: Vec<[f64; D]>,
     gradients: Vec<[f64; D]>,
+    /// Of rings: hoop rows in the frame, and the row of F-bar.
+    hoop: Vec<f64>,
+    swelling: Vec<[f64; D]>,
     /// Address and width of each node's scalar rows.
     rows: Vec<(usize, usize)>,
     batch: Batch,
@@ -191,6 +200,8 @@ impl<const D: usize> Task<'_, D> {
             displacement: Vec::new(),
             force: Vec::new(),
             gradients: Vec::new(),
+            hoop: Vec::new(),
+            swelling: Vec::new(),
             rows: Vec::new(),
             batch: Batch::default(),
         };
@@ -205,7 +216,8 @@ impl<const D: usize> Task<'_, D> {
             }));
             work.force.clear();
             work.force.resize(nodes.len(), [0.0; D]);
-            work.batch.start::<D>(nodes.len());
+            let rings = !self.step.influences.hoop.is_empty();
+            work.batch.start::<D>(nodes.len(), rings);
             if let Some(matrix) = stiffness.as_deref_mut() {
                 self.find_rows(nodes, matrix, &mut work.rows);
             }
@@ -267,6 +279,9 @@ impl<const D: usize> Task<'_, D> {
         let row = step.influences.row(p);
         let gradients = &step.influences.gradients[row.clone()];
         let increment = displacement_gradient(gradients, |a| work.displacement[a]);
+        if !step.influences.hoop.is_empty() {
+            return self.add_ring::<FUSED>(p, &increment, work, health, with_block);
+        }
         if !step.influences.centre_gradients.is_empty() {
             let centres = &step.influences.centre_gradients[row];
             let centre = displacement_gradient(centres, |a| work.displacement[a]);
@@ -284,6 +299,52 @@ impl<const D: usize> Task<'_, D> {
         }
         let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
         self.spread::<FUSED>(gradients, &contribution, work, with_block);
+    }
+
+    /// [`Self::add_point`] with axisymmetry; `increment` is that of the section.
+    fn add_ring<const FUSED: bool>(
+        &self,
+        p: usize,
+        increment: &[[f64; D]; D],
+        work: &mut Workspace<D>,
+        health: &mut Health,
+        with_block: bool,
+    ) {
+        let (step, influences) = (self.step, self.step.influences);
+        let row = influences.row(p);
+        let gradients = &influences.gradients[row.clone()];
+        let rows = &influences.hoop[row.clone()];
+        let nodal = |a: usize| work.displacement[a];
+        let centres = influences.centre_gradients.get(row.clone()).unwrap_or_default();
+        let centre = displacement_gradient(centres, nodal);
+        let hoops = [rows, influences.centre_hoop.get(row.clone()).unwrap_or_default()];
+        let [hoop, centre_hoop] = hoops.map(|rows| hoop_increment(rows, nodal));
+        let increment = Increment { block: increment, hoop };
+        let centre = Increment { block: &centre, hoop: centre_hoop };
+        let averaged = (!centres.is_empty()).then_some(centre);
+        let made = respond_ring(step, self.frame, p, increment, averaged, health);
+        let Some((contribution, hoop)) = made else { return };
+        self.spread::<FUSED>(gradients, &contribution, work, with_block);
+        let volume = contribution.volume;
+        work.hoop.clear();
+        work.hoop.extend(rows.iter().map(|row| row * hoop.map));
+        for (row, force) in work.hoop.iter().zip(&mut work.force) {
+            force[0] = multiply_add::<FUSED>(hoop.stress * volume, *row, force[0]);
+        }
+        if !with_block {
+            return;
+        }
+        work.swelling.clear();
+        if let Some(swelling) = &hoop.swelling {
+            let of_node =
+                |a: usize| swelling.row((&gradients[a], rows[a]), (&centres[a], hoops[1][a]));
+            work.swelling.extend((0..gradients.len()).map(of_node));
+            let rate = swelling.rate.map(|row| row.map(|r| r * volume));
+            work.batch.push_product::<D, FUSED>(&rate, &work.swelling);
+        }
+        let swelling =
+            hoop.swelling.map(|swelling| (swelling.hoop_rate * volume, &work.swelling[..]));
+        work.batch.push_hoop::<D, FUSED>(&work.hoop, &work.gradients, &hoop, volume, swelling);
     }
 
     /// Force and, with the block, the tangent A of a point.
@@ -328,7 +389,21 @@ pub(crate) fn respond<const D: usize>(
     health: &mut Health,
 ) -> Option<Contribution<D>> {
     let (contribution, state) = mechanics::contribution(frame, &start(step, p), increment);
-    sound(p, increment, &state, health).then_some(contribution)
+    sound(p, increment.into(), &state, health).then_some(contribution)
+}
+
+/// [`respond`] of a ring, with F-bar where dF_0 - 1 at the `centre` of cells is given.
+pub(crate) fn respond_ring<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    increment: Increment<'_, D>,
+    centre: Option<Increment<'_, D>>,
+    health: &mut Health,
+) -> Option<(Contribution<D>, Hoop<D>)> {
+    let (contribution, hoop, state) =
+        mechanics::ring_contribution(frame, &start(step, p), increment, centre);
+    sound(p, increment, &state, health).then_some((contribution, hoop))
 }
 
 /// [`respond`] with F-bar, to dF - 1 and dF_0 - 1 at the centres of cells.
@@ -341,7 +416,7 @@ pub(crate) fn respond_averaged<const D: usize>(
 ) -> Option<(Contribution<D>, Dilation<D>)> {
     let (contribution, dilation, state) =
         mechanics::averaged_contribution(frame, &start(step, p), increment, centre);
-    sound(p, increment, &state, health).then_some((contribution, dilation))
+    sound(p, increment.into(), &state, health).then_some((contribution, dilation))
 }
 
 #[inline(always)]
@@ -360,11 +435,12 @@ fn start<const D: usize>(step: StepPoints<'_, D>, p: usize) -> StepStart<'_> {
 #[inline(always)]
 fn sound<const D: usize>(
     p: usize,
-    increment: &[[f64; D]; D],
+    increment: Increment<'_, D>,
     state: &StressState,
     health: &mut Health,
 ) -> bool {
-    if dense::determinant(&dense::plus_unit(increment)) <= 0.0 {
+    let inverted = dense::determinant(&dense::plus_unit(increment.block)) <= 0.0;
+    if inverted || increment.hoop <= -1.0 {
         health.inverted.get_or_insert(p);
     }
     let finite = state.kirchhoff_stress.iter().all(|t| t.is_finite());
@@ -388,7 +464,19 @@ pub(crate) fn start_volume<const D: usize>(step: StepPoints<'_, D>, p: usize) ->
 fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
     let (now, start) = (&points.half_length[p], &points.half_length_initial[p]);
     let ratio: f64 = now.iter().zip(start).map(|(now, start)| now / start).product();
-    points.volume_initial[p] * ratio / points.deformation_gradient[p].determinant()
+    // A ring's hoop is no side of its domain.
+    let gradient = &points.deformation_gradient[p];
+    let hoop = if D == 2 { gradient[(2, 2)] } else { 1.0 };
+    points.volume_initial[p] * ratio * hoop / gradient.determinant()
+}
+
+/// dF_zz - 1 = Σ_a H_a u_ar of a ring ([`crate::basis::radial`]).
+#[inline]
+pub fn hoop_increment<const D: usize>(
+    rows: &[f64],
+    displacement: impl Fn(usize) -> [f64; D],
+) -> f64 {
+    rows.iter().enumerate().map(|(a, row)| row * displacement(a)[0]).sum()
 }
 
 /// dF - 1 = Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7): without the unit, in which small gradients

@@ -8,6 +8,7 @@
 //! |---|---|---|
 //! | traction | t A0 | 0 |
 //! | pressure | -p a, a = det dF dF^-T a_start | w_a [a_i q_k w_b + p (a_i g_bk - g_bi a_k)], q = ∇p, g = ∇S dF^-1 |
+//! | pressure on a ring | as before, a times r_s / r_start | as before, and w_a p a_i δ_k0 w_b / r_s |
 //! | penalty | -β A0 P (x_s - X_s - ū) | β A0 P_ik w_a w_b |
 
 use crate::deck::expression::Expression;
@@ -136,14 +137,30 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
         let first = self.weights.len();
         let row = step.influences.row(point);
         let of_node = |(s, g): (&f64, &[f64; D])| s + dense::dot(g, &offset);
-        let weights = step.influences.weights[row.clone()].iter();
-        self.weights.extend(weights.zip(&step.influences.gradients[row]).map(of_node));
+        let gradients = &step.influences.gradients[row.clone()];
+        match step.influences.hoop.get(row.clone()) {
+            None => {
+                let weights = step.influences.weights[row].iter();
+                self.weights.extend(weights.zip(gradients).map(of_node));
+            }
+            // The place of a ring follows the mean that is not weighted by the radius.
+            Some(rows) => {
+                let whole: f64 = rows.iter().sum();
+                let weights: Vec<f64> = rows.iter().map(|row| row / whole).collect();
+                self.weights.extend(weights.iter().zip(gradients).map(of_node));
+            }
+        }
+        let mut area = carried_area(&in_space(points, point), &own.element.area);
+        if !step.influences.hoop.is_empty() {
+            // Around the axis it has grown with the radius.
+            area = area.map(|a| a * place[0] / own.element.place[0]);
+        }
         self.acts.push(Act {
             point,
             group: step.groups.group_of_point[point],
             weights: first,
             place,
-            area: carried_area(&in_space(points, point), &own.element.area),
+            area,
             element: &own.element,
             kind,
         });
@@ -283,7 +300,9 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                     std::array::from_fn(|i| displacement[first + i])
                 });
                 let change = dense::plus_unit(&increment);
-                let area = carried_area(&change, &act.area);
+                let rings = !step.influences.hoop.is_empty();
+                let turned = if rings { x[0] / act.place[0] } else { 1.0 };
+                let area = carried_area(&change, &act.area).map(|a| a * turned);
                 if !block.is_empty() {
                     let (inverse, _) = dense::inverse(&change);
                     let current: Vec<[f64; D]> = gradients
@@ -296,7 +315,11 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                     add_products::<D, _>(block, nodes.len(), weights.iter().copied(), |b, w, i| {
                         std::array::from_fn(|k| {
                             let turned = area[i] * current[b][k] - current[b][i] * area[k];
-                            w * (area[i] * slope[k] * weights[b] + p * turned)
+                            let mut sum = area[i] * slope[k] * weights[b] + p * turned;
+                            if rings && k == 0 {
+                                sum += p * area[i] * weights[b] / x[0];
+                            }
+                            w * sum
                         })
                     });
                 }

@@ -1,0 +1,212 @@
+//! S, ∇S and S/r of rings: axisymmetry, x = r the radius and y the axis.
+//!
+//! A point stands for the ring 2π r_c A, r_c the radius at the middle of its domain. With the stress
+//! constant on the domain, its share of a node's force is ∫ σ : ∇(N e_i) 2π r dA, that is V times
+//!
+//! - the gradient's row: G_I = ∫ ∇N_I r dA / (r_c A), the mean over the ring's volume;
+//! - the hoop row: H_I = ∫ (N_I / r) r dA / (r_c A) = S°_I / r_c, S° the plain mean of N_I.
+//!
+//! dF_zz - 1 = Σ H_I u_rI. Both are exact, wherever the cells cut the domain: a uniform stress gives no
+//! force at inner nodes (J. A. Nairn and J. E. Guilkey, IJNME 101 (2015) 127-147, weight the functions
+//! by r for this reason). u_r = a r and u_y = b y give dF = (1 + a, 1 + b, 1 + a) to rounding, as
+//! Σ S°_I r_I = r_c. Masses and loads of a point are spread by S_I = ∫ N_I r dA / (r_c A), so that a
+//! weight balances a stress that is constant along r. The place of a point follows Σ S°_I u_I: S
+//! would carry it like the ring's centre of mass, which lies l²/(3 r_c) further out, and part it from its
+//! domain. S°_I is H_I over the sum of its row.
+//!
+//! For `mpm` the domain is a point, and S = S° = N(x_p). A domain that reaches beyond the axis, by what
+//! its update is off, ends at the axis.
+
+use super::gimp::{self, spans};
+use super::product::{Line, for_each_index};
+use super::{Influences, lattice_of, outside};
+use crate::deck::model::Basis;
+use crate::error::{Error, Result};
+use crate::grid::{Grid, Lattice};
+use crate::points::Points;
+
+/// Makes the rows those of rings: fills `hoop`, and weighs those of `gimp` by the radius. With
+/// centres, the rows of F-bar have been filled by [`super::centre`] before. Error: a point that is not
+/// off the axis, by id and place.
+pub fn turn<const D: usize>(
+    grid: &Grid<D>,
+    basis: Basis,
+    points: &Points<D>,
+    influences: &mut Influences<D>,
+) -> Result<()> {
+    influences.hoop = vec![0.0; influences.nodes.len()];
+    if !influences.centre_gradients.is_empty() {
+        influences.centre_hoop = vec![0.0; influences.nodes.len()];
+    }
+    match basis {
+        Basis::Mpm => turn_points(grid, points, influences),
+        Basis::Gimp => turn_domains(grid, points, influences),
+        Basis::Cpdi1 | Basis::Cpdi2 => Err(Error::Input(
+            "analysis.symmetry = \"axisymmetric\" is for basis = \"mpm\" and basis = \"gimp\""
+                .into(),
+        )),
+    }
+}
+
+fn turn_points<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    influences: &mut Influences<D>,
+) -> Result<()> {
+    for p in 0..points.len() {
+        let (row, radius) = (influences.row(p), points.position[p][0]);
+        if !(radius > 0.0) {
+            return Err(on_axis(grid, points, p));
+        }
+        // The row's nodes are those of the cell, and its centre is the mean of them.
+        let count = row.len() as f64;
+        let centre =
+            row.clone().map(|at| grid.node_position(influences.nodes[at])[0]).sum::<f64>() / count;
+        for at in row {
+            influences.hoop[at] = influences.weights[at] / radius;
+            if let Some(hoop) = influences.centre_hoop.get_mut(at) {
+                *hoop = 1.0 / (count * centre);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn turn_domains<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    influences: &mut Influences<D>,
+) -> Result<()> {
+    let lattice = lattice_of(grid)?;
+    let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
+    let mut middles: [Line; D] = lines.clone();
+    let mut radial = Radial::default();
+    let with_centres = !influences.centre_hoop.is_empty();
+    for p in 0..points.len() {
+        let spans = spans(grid, lattice, points, p)?;
+        let (x, half) = (&points.position[p], &points.half_length[p]);
+        for axis in 1..D {
+            let (centre, spacing) = (lattice.scaled(axis, x[axis]), lattice.spacing[axis]);
+            let reach = half[axis] / spacing;
+            gimp::fill::<false>(&mut lines[axis], spans[axis], centre, reach, spacing, None);
+            if with_centres {
+                gimp::fill::<true>(&mut middles[axis], spans[axis], centre, reach, spacing, None);
+            }
+        }
+        let cells = spans[0].last - spans[0].first + 1;
+        let ends = [(x[0] - half[0]).max(0.0), x[0] + half[0]];
+        if !(x[0] > 0.0) {
+            return Err(on_axis(grid, points, p));
+        }
+        radial.fill(lattice, spans[0].first, cells, ends);
+        let counts = spans.map(|span| span.last - span.first + 2);
+        let start = influences.row(p).start;
+        let mut at = start;
+        for_each_index(&counts, |index| {
+            // S and H are products of the lines, and so is each component of the gradient.
+            let along = |lines: &[Line; D], slope: Option<usize>| -> f64 {
+                (1..D)
+                    .map(|a| {
+                        let line = &lines[a];
+                        if slope == Some(a) {
+                            line.slopes[index[a]]
+                        } else {
+                            line.weights[index[a]]
+                        }
+                    })
+                    .product()
+            };
+            let r = index[0];
+            let across = along(&lines, None);
+            influences.weights[at] = radial.weights[r] * across;
+            influences.hoop[at] = radial.hoop[r] * across;
+            influences.gradients[at] = std::array::from_fn(|a| match a {
+                0 => radial.slopes[r] * across,
+                _ => radial.weights[r] * along(&lines, Some(a)),
+            });
+            if with_centres {
+                let across = along(&middles, None);
+                influences.centre_hoop[at] = radial.centre_hoop[r] * across;
+                influences.centre_gradients[at] = std::array::from_fn(|a| match a {
+                    0 => radial.slopes[r] * across,
+                    _ => radial.centre_weights[r] * along(&middles, Some(a)),
+                });
+            }
+            at += 1;
+        });
+        debug_assert_eq!(at, influences.row(p).end, "rows of gimp are those of its spans");
+    }
+    Ok(())
+}
+
+/// Functions of consecutive nodes along the radius.
+#[derive(Debug, Clone, Default)]
+struct Radial {
+    /// ∫ N r dr / (r_c L)
+    weights: Vec<f64>,
+    /// ∫ N' r dr / (r_c L), 1/m
+    slopes: Vec<f64>,
+    /// ∫ N dr / (r_c L), 1/m
+    hoop: Vec<f64>,
+    /// N and N/r at the middles of the cells, weighted by their shares of the ring's volume
+    centre_weights: Vec<f64>,
+    centre_hoop: Vec<f64>,
+}
+
+impl Radial {
+    /// Over `ends`, m, in `cells` cells from cell `first` on. Beyond the grid's edge the straight lines
+    /// of the outer cell go on.
+    fn fill<const D: usize>(
+        &mut self,
+        lattice: &Lattice<D>,
+        first: usize,
+        cells: usize,
+        [low, high]: [f64; 2],
+    ) {
+        for values in [
+            &mut self.weights,
+            &mut self.slopes,
+            &mut self.hoop,
+            &mut self.centre_weights,
+            &mut self.centre_hoop,
+        ] {
+            values.clear();
+            values.resize(cells + 1, 0.0);
+        }
+        let spacing = lattice.spacing[0];
+        let line = |node: usize| lattice.origin[0] + (first + node) as f64 * spacing;
+        let (length, middle) = (high - low, 0.5 * (low + high));
+        for cell in 0..cells {
+            let start = if cell == 0 { low } else { line(cell) };
+            let end = if cell + 1 == cells { high } else { line(cell + 1) };
+            let (piece, radius) = (end - start, 0.5 * (start + end));
+            // Share of the domain's area and of the ring's volume.
+            let plain = piece / length;
+            let share = plain * radius / middle;
+            // Place in the cell of the piece's middle and of its ring's centre of mass.
+            let at = (radius - line(cell)) / spacing;
+            let centre = at + piece * piece / (12.0 * radius * spacing);
+            let cell_radius = line(cell) + 0.5 * spacing;
+            for (node, n, n_plain, sign) in
+                [(cell, 1.0 - centre, 1.0 - at, -1.0), (cell + 1, centre, at, 1.0)]
+            {
+                self.weights[node] += share * n;
+                self.slopes[node] += sign * share / spacing;
+                self.hoop[node] += plain * n_plain / middle;
+                self.centre_weights[node] += 0.5 * share;
+                self.centre_hoop[node] += 0.5 * share / cell_radius;
+            }
+        }
+    }
+}
+
+fn on_axis<const D: usize>(grid: &Grid<D>, points: &Points<D>, p: usize) -> Error {
+    if points.position[p][0] < 0.0 {
+        return outside(grid, points, p);
+    }
+    Error::Run(format!(
+        "point {} at {:?} m lies on the axis x = 0, where it is no ring: with analysis.symmetry = \
+         \"axisymmetric\" points need a radius above zero",
+        points.id[p], points.position[p]
+    ))
+}

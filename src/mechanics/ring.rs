@@ -1,0 +1,121 @@
+//! Axisymmetry: the hoop direction beside the two of the section (x = r, y the axis, z the hoop).
+//!
+//! With the hoop rows s_a of the nodes, dF_zz - 1 = Σ s_a u_ar. The third principal axis of the trial
+//! strain is the hoop, so that L_zz = d(dF_zz) / dF_zz joins the formula of `tangent.rs` as one more
+//! direction: f_a0 += T_zz s_a V and, with A_ijkl of that formula,
+//! K_aibk += (g_aj A_ijzz s_b δ_k0 + s_a δ_i0 A_zzkl g_bl + s_a s_b δ_i0 δ_k0 A_zzzz) V. Gradients g and
+//! rows s are those of the frame.
+//!
+//! F-bar acts on all three directions: dF_bar = (det dF_0 / det dF)^(1/3) dF, both determinants with
+//! their hoop.
+
+use super::tangent;
+use super::update;
+use super::{Contribution, Increment, Placement, StepStart, StressState, dilation};
+use crate::deck::model::Frame;
+use crate::tensor::dense::{self, Square};
+
+/// What the hoop direction adds to a point's [`Contribution`].
+#[derive(Debug, Clone, Copy)]
+pub struct Hoop<const D: usize> {
+    /// s of the frame over s of the step's start: 1, 1/dF_zz or F_zz.
+    pub map: f64,
+    /// T_zz, Pa
+    pub stress: f64,
+    /// A_ijzz, Pa: what a hoop strain does to the section.
+    pub from: Square<D>,
+    /// A_zzkl, Pa
+    pub onto: Square<D>,
+    /// A_zzzz, Pa
+    pub own: f64,
+    /// With F-bar the product that it adds.
+    pub swelling: Option<Swelling<D>>,
+}
+
+/// What F-bar adds to a ring's tangent: K_aibk += (g_aj R_ij + s_a δ_i0 R_zz) r_bk V.
+#[derive(Debug, Clone, Copy)]
+pub struct Swelling<const D: usize> {
+    /// R_ij and R_zz: change of T for an expansion L = 1 in all three directions, Pa.
+    pub rate: Square<D>,
+    pub hoop_rate: f64,
+    /// dF^-1, with the hoop's
+    here: (Square<D>, f64),
+    /// dF_0^-1
+    centre: (Square<D>, f64),
+}
+
+impl<const D: usize> Swelling<D> {
+    /// r_b = (dF_0^-T G_0b - dF^-T G_b + (s_0b / dF_0zz - s_b / dF_zz) e_r) / 3, 1/m, of a node's
+    /// gradients and hoop rows at the point and at the centres.
+    #[inline]
+    pub fn row(&self, own: (&[f64; D], f64), centre: (&[f64; D], f64)) -> [f64; D] {
+        std::array::from_fn(|k| {
+            let mut sum = 0.0;
+            for m in 0..D {
+                sum += centre.0[m] * self.centre.0[m][k] - own.0[m] * self.here.0[m][k];
+            }
+            if k == 0 {
+                sum += centre.1 * self.centre.1 - own.1 * self.here.1;
+            }
+            sum / 3.0
+        })
+    }
+}
+
+/// dF_bar - 1 of a ring, the hoop's last, from dF - 1 and dF_0 - 1. Not a number where a determinant
+/// is not positive.
+#[inline]
+pub fn averaged<const D: usize>(
+    own: Increment<'_, D>,
+    centre: Increment<'_, D>,
+) -> (Square<D>, f64) {
+    let [here, common] = [own, centre].map(dilation::logarithm);
+    let growth = ((common - here) / 3.0).exp_m1();
+    (dilation::grown(own.block, growth), own.hoop + growth * (1.0 + own.hoop))
+}
+
+/// Stress and tangent of a ring in `frame`; with F-bar where the increment at the `centre` of the cells
+/// is given. Limits as in [`super::stress`].
+#[inline]
+pub fn ring_contribution<const D: usize>(
+    frame: Frame,
+    start: &StepStart,
+    increment: Increment<'_, D>,
+    centre: Option<Increment<'_, D>>,
+) -> (Contribution<D>, Hoop<D>, StressState) {
+    let bar = centre.map(|centre| averaged(increment, centre));
+    let straining =
+        bar.as_ref().map_or(increment, |(block, hoop)| Increment { block, hoop: *hoop });
+    let update = update::update(start, straining);
+    let growth = 1.0 + increment.hoop;
+    let whole = dense::plus_unit(increment.block);
+    let placement = Placement::new(frame, start, &whole, growth);
+    let contribution = placement.contribution(&update);
+    let start_zz = start.deformation_gradient[(2, 2)];
+    // dy/dx along the hoop.
+    let (map, back) = match frame {
+        Frame::Previous => (1.0, 1.0 / growth),
+        Frame::Updated => (1.0 / growth, 1.0),
+        Frame::Total => (start_zz, 1.0 / (start_zz * growth)),
+    };
+    let scale = placement.scale * back;
+    let stress = update.response.stress[2];
+    let (from, onto) = tangent::coupling(&update, &placement.back, scale);
+    let own = scale * back * (update.response.tangent[2][2] - stress);
+    let swelling = centre.map(|centre| {
+        let inverse = |h: Increment<'_, D>| {
+            (dense::inverse(&dense::plus_unit(h.block)).0, 1.0 / (1.0 + h.hoop))
+        };
+        let mut rate = tangent::expansion(&update, &placement.back, placement.scale);
+        // A_ijzz holds one factor dy/dx of the hoop that the rate is without.
+        for (row, more) in rate.iter_mut().zip(&from) {
+            for (rate, more) in row.iter_mut().zip(more) {
+                *rate += more / back;
+            }
+        }
+        let hoop_rate = scale * update.response.tangent[2].iter().sum::<f64>();
+        Swelling { rate, hoop_rate, here: inverse(increment), centre: inverse(centre) }
+    });
+    let hoop = Hoop { map, stress: scale * stress, from, onto, own, swelling };
+    (contribution, hoop, update.state(&start.material))
+}
