@@ -1,5 +1,5 @@
 # Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
-.PHONY: help setup build run install test bench iterations scaling compare docs validate lint clean
+.PHONY: gallery install-extras help setup build run install test bench iterations scaling compare docs validate lint clean
 
 RANKS ?= 2
 DECK  ?= inputs/beam.toml
@@ -17,7 +17,9 @@ help:
 	@echo "make scaling   strong and weak scaling: timed on this machine's cores, counted to 64 ranks"
 	@echo "make compare   KratosMPMApplication beside this program, in turn (network, minutes)"
 	@echo "make validate  the longer tests: decks with published numbers"
-	@echo "make docs      the code's own documentation"
+	@echo "make docs      the code's own documentation, and the book where mdbook is installed"
+	@echo "make gallery   a picture of every template, for docs/figures"
+	@echo "make install-extras  install, and the manual page and bash completions"
 	@echo "make setup     install the Debian packages that are missing"
 	@echo "variables: RANKS=$(RANKS) DECK=$(DECK) ARGS='--set analysis.steps=10'"
 
@@ -61,8 +63,21 @@ compare: build
 validate: setup
 	MPM_PAR_VALIDATION=1 cargo test --release --no-fail-fast -- --include-ignored
 
+# The book needs mdbook (cargo install mdbook); without it only the code's documentation is made.
 docs: setup
 	cargo doc --no-deps
+	@if command -v mdbook >/dev/null; then mdbook build docs; else echo "no mdbook: target/book is not made"; fi
+
+# The picture of every template, by the program itself.
+gallery: build
+	sh jobs/gallery.sh
+
+# Shell completions and the manual page below PREFIX.
+install-extras: install
+	@install -d $(DESTDIR)$(PREFIX)/share/man/man1 $(DESTDIR)$(PREFIX)/share/bash-completion/completions
+	@$(PROGRAM) man > $(DESTDIR)$(PREFIX)/share/man/man1/mpm-par.1
+	@$(PROGRAM) completions bash > $(DESTDIR)$(PREFIX)/share/bash-completion/completions/mpm-par
+	@echo "installed the manual page and bash completions"
 
 lint:
 	cargo fmt --check

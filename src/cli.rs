@@ -3,17 +3,22 @@
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
 
+use crate::deck::templates::{Template, template_of};
+use crate::deck::{explain, json_schema, list};
 use crate::error::{Error, Result};
 use crate::record::checkpointing::Restart;
 
 /// The command line, read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Arguments {
-    /// Text of `--help` or `--version`: print it and leave with 0; nothing else is set.
+    /// Text of `--help`, `--version`, `--list` and their like: print it and leave with 0; nothing
+    /// else is set.
     pub print: Option<String>,
+    /// `--new`: write this deck and leave with 0; nothing else but `force` is set.
+    pub new: Option<Template>,
     /// The deck.
     pub input: PathBuf,
     /// `KEY=VALUE`, in order.
@@ -52,12 +57,12 @@ const USAGE: &str = "mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out 
     disable_help_flag = true,
     disable_version_flag = true,
     override_usage = USAGE,
-    after_help = "Words with one dash, and their values, go to PETSc: -qs_ for equilibrium, -mass_ for mass solves.\nExit codes: 0 done, 1 the run failed, 2 bad input, 3 restart or file problem, 4 environment."
+    after_help = "Words with one dash, and their values, go to PETSc: -qs_ for equilibrium, -mass_ for mass solves.\nTools: mpm-par report DIR, mpm-par plot DIR --field F -o FILE, mpm-par completions SHELL, mpm-par man; each has --help.\nExit codes: 0 done, 1 the run failed, 2 bad input, 3 restart or file problem, 4 environment."
 )]
 struct Words {
     /// The deck; - reads it from standard input
-    #[arg(value_name = "INPUT.toml")]
-    input: PathBuf,
+    #[arg(value_name = "INPUT.toml", required_unless_present_any = ["list", "explain", "schema", "new"])]
+    input: Option<PathBuf>,
     /// Change a key of the deck by its dotted path; the value is TOML
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     set: Vec<String>,
@@ -79,6 +84,18 @@ struct Words {
     /// Show every step
     #[arg(long)]
     verbose: bool,
+    /// Write a commented deck to start from, NAME.toml: --list tells the names
+    #[arg(long, value_name = "NAME")]
+    new: Option<String>,
+    /// List materials, bases, analyses, loads, fields and templates, one line each
+    #[arg(long)]
+    list: bool,
+    /// Tell what a key, a model, a field or a choice of the deck means
+    #[arg(long, value_name = "WORD")]
+    explain: Option<String>,
+    /// Print the JSON Schema of decks, for editors
+    #[arg(long)]
+    schema: bool,
     /// Print help (also -h)
     #[arg(long, action = clap::ArgAction::Help)]
     help: Option<bool>,
@@ -91,7 +108,117 @@ struct Words {
 pub const STANDARD_INPUT: &str = "-";
 
 /// Options of ours that take the next word.
-const WITH_VALUE: [&str; 3] = ["--set", "--out", "--restart"];
+const WITH_VALUE: [&str; 5] = ["--set", "--out", "--restart", "--explain", "--new"];
+
+/// What the program does besides running decks.
+#[derive(Debug, Clone, PartialEq, Subcommand)]
+pub enum Tool {
+    /// Write report.html of a results directory, also while its run goes on
+    Report {
+        /// The results directory
+        #[arg(value_name = "DIR")]
+        directory: PathBuf,
+        /// Somewhere else than DIR/report.html
+        #[arg(short, long, value_name = "FILE")]
+        output: Option<PathBuf>,
+    },
+    /// Draw points coloured by a field, or columns of a table, to a .png or .svg
+    Plot(Plot),
+    /// Print the completions of a shell
+    Completions {
+        /// Which one
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page
+    Man,
+}
+
+/// What to draw.
+#[derive(Debug, Clone, PartialEq, clap::Args)]
+pub struct Plot {
+    /// The results directory
+    #[arg(value_name = "DIR")]
+    pub directory: PathBuf,
+    /// Points by this field: stress.yy, |displacement|, J
+    #[arg(long, value_name = "FIELD", required_unless_present = "columns")]
+    pub field: Option<String>,
+    /// Step of the frame (default: the last)
+    #[arg(long, value_name = "N", requires = "field")]
+    pub step: Option<usize>,
+    /// Values of the first and the last colour, as LOW,HIGH (default: those of the frame)
+    #[arg(
+        long,
+        value_name = "LOW,HIGH",
+        requires = "field",
+        value_delimiter = ',',
+        num_args = 2,
+        allow_hyphen_values = true
+    )]
+    pub range: Option<Vec<f64>>,
+    /// Curves: columns of a table, by their names without units, separated by commas
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', conflicts_with = "field")]
+    pub columns: Vec<String>,
+    /// The table of the curves: history, probes, residuals, element
+    #[arg(long, value_name = "TABLE", default_value = "history")]
+    pub table: String,
+    /// Column across (default: time, or load_factor, or step)
+    #[arg(long, value_name = "NAME")]
+    pub x: Option<String>,
+    /// A logarithmic vertical axis
+    #[arg(long)]
+    pub log: bool,
+    /// The picture: NAME.png or NAME.svg
+    #[arg(short, long, value_name = "FILE")]
+    pub output: PathBuf,
+}
+
+#[derive(Debug, Parser)]
+#[command(name = "mpm-par", version)]
+struct Tools {
+    #[command(subcommand)]
+    tool: Tool,
+}
+
+/// Words that ask for nothing but a text or a small file: neither MPI nor PETSc is needed.
+const ALONE: [&str; 8] =
+    ["-h", "-V", "--help", "--version", "--list", "--schema", "--explain", "--new"];
+
+/// True if the command line (the program's name first) starts no run.
+pub fn runs_nothing(words: &[OsString]) -> bool {
+    let is_alone = |word: &OsString| {
+        let text = word.to_string_lossy();
+        ALONE.contains(&text.split('=').next().unwrap_or_default())
+    };
+    is_tool(words) || words.iter().skip(1).any(is_alone)
+}
+
+/// True if the first word is that of a [`Tool`].
+pub fn is_tool(words: &[OsString]) -> bool {
+    let first = words.get(1).map(|word| word.to_string_lossy());
+    first.is_some_and(|first| {
+        Tools::command().get_subcommands().any(|tool| tool.get_name() == first)
+    })
+}
+
+/// The tool that the words ask for; `Ok(Err(text))` is a help text to print.
+pub fn tool(words: &[OsString]) -> Result<std::result::Result<Tool, String>> {
+    match Tools::try_parse_from(words) {
+        Ok(tools) => Ok(Ok(tools.tool)),
+        Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
+            Ok(Err(e.to_string()))
+        }
+        Err(e) => {
+            let text = e.to_string();
+            Err(Error::Input(text.strip_prefix("error: ").unwrap_or(&text).trim_end().to_string()))
+        }
+    }
+}
+
+/// The whole command line with its tools, for completions and the manual page.
+pub fn whole_command() -> clap::Command {
+    let tools = Tools::command();
+    Words::command().subcommands(tools.get_subcommands().cloned())
+}
 
 /// Reads the command line; the first word is the program's name. Error: bad usage, with the
 /// usage text.
@@ -104,7 +231,18 @@ pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Arguments> {
         }
         Err(e) => return Err(Error::Input(bad_usage(&e.to_string()))),
     };
-    let out = words.out.unwrap_or_else(|| default_out(&words.input));
+    let printed = match (&words.explain, words.list, words.schema) {
+        (Some(word), ..) => Some(explain::explain(word)?),
+        (None, true, _) => Some(list::list()),
+        (None, false, true) => Some(format!("{:#}", json_schema::json_schema())),
+        (None, false, false) => None,
+    };
+    let new = words.new.as_deref().map(template_of).transpose()?;
+    if printed.is_some() || new.is_some() {
+        return Ok(Arguments { print: printed, new, force: words.force, ..Arguments::default() });
+    }
+    let input = words.input.unwrap_or_default();
+    let out = words.out.unwrap_or_else(|| default_out(&input));
     if out.to_str().is_none() {
         return Err(Error::Input(format!(
             "the results directory {} has a name that is not UTF-8, which HDF5 files cannot have: \
@@ -118,7 +256,8 @@ pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Arguments> {
     });
     Ok(Arguments {
         print: None,
-        input: words.input,
+        new: None,
+        input,
         sets: words.set,
         out,
         check: words.check,

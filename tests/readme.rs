@@ -27,6 +27,9 @@ const NOT_RUN: &[(&str, &str)] = &[
 /// Pages whose decks are run to their end; those of other pages are checked.
 const RUN_DECKS_OF: [&str; 2] = ["README.md", "docs/guide/deck.md"];
 
+/// A page whose commands are run as they stand.
+const FIRST_HOUR: &str = "docs/guide/start.md";
+
 struct Block {
     /// `README.md:41`
     place: String,
@@ -203,6 +206,33 @@ fn the_commands_of_readme_run_as_printed() {
     assert!(files >= 8, "{files} files of results are named");
 }
 
+/// The guide's first hour, in one folder.
+#[test]
+fn the_first_hour_runs_as_printed() {
+    let scratch = tempfile::tempdir().expect("a scratch folder");
+    let folder = scratch.path();
+    for block in tagged("sh").iter().filter(|block| block.page == FIRST_HOUR) {
+        for command in commands(block) {
+            assert_runs(&block.place, command, &shell(folder, command));
+        }
+    }
+    for file in ["slope.toml", "out/slope/report.html", "slope-p.png", "crest.svg"] {
+        assert!(folder.join(file).exists(), "{FIRST_HOUR} makes {file}");
+    }
+}
+
+/// Every page is in the book's table, but for the log.
+#[test]
+fn the_book_has_every_page() {
+    let summary = std::fs::read_to_string(root().join("docs/SUMMARY.md")).expect("text");
+    for (page, _) in pages() {
+        let Some(page) = page.strip_prefix("docs/").filter(|page| *page != "SUMMARY.md") else {
+            continue;
+        };
+        assert!(summary.contains(&format!("]({page})")), "docs/SUMMARY.md has no {page}");
+    }
+}
+
 /// Runs the block where Python has what it imports; else looks for the data that it names.
 fn python(block: &Block, folder: &Path) {
     let modules = Command::new("python3").args(["-c", "import h5py, numpy"]).output();
@@ -237,7 +267,8 @@ fn python(block: &Block, folder: &Path) {
 /// Every command printed in docs/ is known here: an unknown one would be neither run nor listed.
 #[test]
 fn commands_of_the_pages_are_listed() {
-    for block in tagged("sh").iter().filter(|block| block.page != "README.md") {
+    let run = ["README.md", FIRST_HOUR];
+    for block in tagged("sh").iter().filter(|block| !run.contains(&block.page.as_str())) {
         for command in commands(block) {
             let Some(why) = not_run(command) else {
                 panic!("{}: {command}: neither run nor listed in NOT_RUN", block.place);

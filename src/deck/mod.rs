@@ -13,13 +13,18 @@
 //! | `sections/` | each section's values and the checks across sections |
 //! | `resolved.rs` | the deck with every default, as TOML |
 //! | `physics.rs` | the part that a continued run must share |
-//! | `reference.rs` | the schema as documentation |
+//! | `reference.rs`, `json_schema.rs` | the schema as documentation, and as JSON Schema |
+//! | `list.rs`, `explain.rs` | `--list`, `--explain` |
+//! | `templates.rs`, `templates/` | `--new`: decks to start from |
 //! | `expression/`, `shape.rs` | formulas; regions of space |
 //! | `crossing.rs` | where lines and boxes meet the boundary of a region |
 
 mod crossing;
+pub mod explain;
 pub mod expression;
 pub mod fields;
+pub mod json_schema;
+pub mod list;
 mod marks;
 pub mod model;
 pub mod physics;
@@ -31,6 +36,7 @@ mod resolved;
 pub mod schema;
 mod sections;
 pub mod shape;
+pub mod templates;
 mod tree;
 mod unread;
 mod words;

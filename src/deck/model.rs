@@ -621,6 +621,17 @@ pub enum VerifyNorm {
     Max,
 }
 
+/// Readers of frames.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Format {
+    /// XDMF beside the HDF5 files.
+    Xdmf,
+    /// The HDF5 files of the points are VTKHDF files as well.
+    VtkHdf,
+    /// VTK files of the points, too.
+    Vtu,
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
     pub every: Every,
@@ -632,6 +643,10 @@ pub struct Output {
     /// Point fields to write.
     pub fields: Vec<String>,
     pub checkpoint: Option<Checkpoint>,
+    /// For whom the frames are prepared.
+    pub formats: Vec<Format>,
+    /// `report.html` at the end of the run.
+    pub report: bool,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -25,6 +25,8 @@ pub fn physics(deck: &Deck) -> String {
         log: Every::Steps(1),
         fields: Vec::new(),
         checkpoint: None,
+        formats: Vec::new(),
+        report: false,
     };
     let mut time_step = String::new();
     if may_be_extended(&deck) {

@@ -467,6 +467,9 @@ fn results(w: &mut Writer<'_>, deck: &Deck) {
     w.line("output", "history", interval(deck.output.history));
     w.line("output", "log", interval(deck.output.log));
     w.line("output", "fields", array(deck.output.fields.iter().map(|field| quote(field))));
+    let formats = deck.output.formats.iter().map(|format| quote(format.name()));
+    w.line("output", "format", array(formats));
+    w.line("output", "report", deck.output.report.to_string());
     if let Some(checkpoint) = &deck.output.checkpoint {
         let mut pairs = Vec::new();
         pairs.extend(checkpoint.every.map(|steps| ("every", steps.to_string())));

@@ -1,7 +1,7 @@
 //! The deck's own words for the enumerations of the model.
 
 use super::model::{
-    AffineTransfer, AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame,
+    AffineTransfer, AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Format, Frame,
     GhostScaling, GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume,
     PositionUpdate, StressUpdate, Symmetry, Tangent, VerifyNorm,
 };
@@ -73,5 +73,6 @@ words! {
     Element { "quad4" => Quad4, "tri3" => Tri3, "hex8" => Hex8, "tet4" => Tet4 }
     Initial { "balanced" => Balanced, "slabs" => Slabs }
     Cost { "points" => Points, "time" => Time }
+    Format { "xdmf" => Xdmf, "vtkhdf" => VtkHdf, "vtu" => Vtu }
     VerifyNorm { "volume-l1" => VolumeL1, "volume-l2" => VolumeL2, "max" => Max }
 }

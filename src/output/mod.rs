@@ -6,6 +6,8 @@
 //! | `series/` | fields over time: HDF5 and XDMF |
 //! | `tables/` | `history.csv`, `residuals.csv` |
 //! | `restart/` | checkpoints, one run at a time |
+//! | `plot/` | pictures of points and tables |
+//! | `report/` | `report.html` |
 //! | `terminal/` | what the terminal and `log.txt` say |
 //! | `summary.rs`, `extent.rs` | `summary.json` |
 //! | `start.rs` | what writing asks of the process before MPI starts |
@@ -22,6 +24,8 @@ pub mod directory;
 pub mod extent;
 pub mod names;
 pub mod ownership;
+pub mod plot;
+pub mod report;
 pub mod restart;
 pub mod series;
 pub mod start;

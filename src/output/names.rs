@@ -11,6 +11,8 @@ pub const SUMMARY: &str = "summary.json";
 pub const HISTORY: &str = "history.csv";
 /// Rows of an element test.
 pub const ELEMENT: &str = "element.csv";
+/// The run in one page.
+pub const REPORT: &str = "report.html";
 /// Rows of `[[probe]]`.
 pub const PROBES: &str = "probes.csv";
 pub const RESIDUALS: &str = "residuals.csv";
@@ -28,16 +30,26 @@ pub const SERIES_HEAD: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
      <Xdmf Version=\"3.0\">\n  <Domain>\n    \
      <Grid Name=\"series\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
 
+/// Lists of frames for ParaView, and how they begin.
+pub const PVD: &str = "points.pvd";
+pub const PVD_HEAD: &str =
+    "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n";
+pub const SERIES: &str = "points.vtkhdf.series";
+pub const SERIES_LIST_HEAD: &str = "{\"file-series-version\":\"1.0\",\"files\":[\n";
+
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 14] = [
     SUMMARY,
     HISTORY,
     PROBES,
+    REPORT,
     RESIDUALS,
     ELEMENT,
     LOG,
     DECK,
     RESOLVED_DECK,
+    PVD,
+    SERIES,
     "points.xdmf",
     "grid.xdmf",
     "domains.xdmf",
@@ -65,13 +77,20 @@ pub fn names_in(folder: &Path) -> Result<Vec<String>> {
 
 fn is_ours(name: &str) -> bool {
     let name = without_ending(name);
-    NAMES.contains(&name) || NUMBERED.iter().any(|begin| number_of(name, begin).is_some())
+    let numbered = NUMBERED.iter().any(|begin| number_of(name, begin).is_some());
+    NAMES.contains(&name) || numbered || frame_of(name).is_some()
 }
 
 /// Number of the finished file `begin`NNNNNN.h5; `None` for other names.
 pub fn number_of(name: &str, begin: &str) -> Option<usize> {
     let number = name.strip_prefix(begin)?.strip_suffix(".h5")?.parse().ok()?;
     (name == format!("{begin}{number:0DIGITS$}.h5")).then_some(number)
+}
+
+/// Step of the frame that a file belongs to; `None` for other names.
+pub fn frame_of(name: &str) -> Option<usize> {
+    let hdf5 = ["points-", "grid-"].iter().find_map(|begin| number_of(name, begin));
+    hdf5.or_else(|| number_of(&format!("{}.h5", name.strip_suffix(".vtu")?), "points-"))
 }
 
 fn without_ending(name: &str) -> &str {
@@ -97,6 +116,9 @@ mod tests {
             "checkpoint-000012.h5.passed-over",
             "points.xdmf.partial",
             "points.xdmf.partial.partial",
+            "points-000005.vtu",
+            "points-000005.vtu.superseded",
+            "points.pvd.partial",
         ] {
             assert!(is_ours(name), "{name}");
         }
@@ -107,6 +129,7 @@ mod tests {
             "my-points-000005.h5",
             "notes.txt",
             "grid.h5",
+            "grid-000005.vtu",
             ".mpm-par.lock",
         ] {
             assert!(!is_ours(name), "{name}");

@@ -10,8 +10,10 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::names::{
-    DECK, ELEMENT, HISTORY, LOG, PROBES, RESIDUALS, RESOLVED_DECK, SERIES_HEAD, SUMMARY, names_in,
+    DECK, ELEMENT, HISTORY, LOG, PROBES, PVD, PVD_HEAD, REPORT, RESIDUALS, RESOLVED_DECK, SERIES,
+    SERIES_HEAD, SERIES_LIST_HEAD, SUMMARY, names_in,
 };
+use super::report;
 use super::restart::seal;
 use crate::error::Result;
 
@@ -35,15 +37,18 @@ enum Proof {
 }
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [(&str, Proof); 11] = [
+const NAMES: [(&str, Proof); 14] = [
     (SUMMARY, Proof::Summary),
     (HISTORY, Proof::Begins(TABLE_HEAD)),
     (RESIDUALS, Proof::Begins(TABLE_HEAD)),
     (PROBES, Proof::Begins(TABLE_HEAD)),
+    (REPORT, Proof::Begins(report::HEAD)),
     (ELEMENT, Proof::Begins(TABLE_HEAD)),
     (LOG, Proof::Begins(LOG_HEAD)),
     (DECK, Proof::Company),
     (RESOLVED_DECK, Proof::Company),
+    (PVD, Proof::Begins(PVD_HEAD)),
+    (SERIES, Proof::Begins(SERIES_LIST_HEAD)),
     ("points.xdmf", Proof::Begins(SERIES_HEAD)),
     ("grid.xdmf", Proof::Begins(SERIES_HEAD)),
     ("domains.xdmf", Proof::Begins(SERIES_HEAD)),

@@ -21,7 +21,7 @@ use super::tables::history::History;
 use super::tables::history::{HistoryRow, Layout, Reaction};
 use super::tables::residuals::Residuals;
 use super::terminal::log::Log;
-use crate::deck::model::{Basis, Element, Symmetry};
+use crate::deck::model::{Basis, Element, Format, Symmetry};
 use crate::error::Error;
 use crate::points::Points;
 
@@ -109,8 +109,8 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
     let directory =
         ResultsDirectory::create(&folder.join("out"), false, &Inputs::default(), comm).unwrap();
     let points = share_of_points::<D>(comm);
-    let mut series = PointsSeries::create(&directory, PointField::ALL, basis, D);
-    let mut grid = GridSeries::create(&directory);
+    let mut series = PointsSeries::create(&directory, PointField::ALL, &[Format::Xdmf], basis, D);
+    let mut grid = GridSeries::create(&directory, &[Format::Xdmf]);
     // One cell on each rank with points, with its own nodes.
     let cells = usize::from(!points.is_empty());
     let nodes = cells << D;
@@ -132,9 +132,16 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
         grid.write(step, 0.1 * step as f64, &frame, comm).unwrap();
     }
     // A restart after step 0 forgets step 5 and writes it again.
-    let mut series =
-        PointsSeries::resume(&directory, PointField::ALL, basis, D, 0, &mut Log::silent(), comm)
-            .unwrap();
+    let mut series = PointsSeries::resume(
+        &directory,
+        PointField::ALL,
+        &[Format::Xdmf],
+        (basis, D),
+        0,
+        &mut Log::silent(),
+        comm,
+    )
+    .unwrap();
     series.cut(comm).unwrap();
     series.write(5, 0.5, &points, comm).unwrap();
 

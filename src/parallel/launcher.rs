@@ -32,6 +32,12 @@ pub fn warning(
     ))
 }
 
+/// The rank of this process as its launcher tells before MPI starts; 0 without a launcher.
+pub fn rank_of_process(variable: impl Fn(&str) -> Option<String>) -> usize {
+    let names = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
+    names.iter().find_map(|name| variable(name)?.parse().ok()).unwrap_or(0)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

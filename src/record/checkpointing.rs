@@ -15,7 +15,7 @@ use crate::input_file;
 use crate::output::agreement::on_root;
 use crate::output::directory::ResultsDirectory;
 use crate::output::directory::{PASSED_OVER, SUPERSEDED};
-use crate::output::names::{names_in, number_of};
+use crate::output::names::{frame_of, names_in, number_of};
 use crate::output::restart::checkpoint::{self, Checkpoint, Refusal, Restored};
 use crate::output::restart::run_state::RunState;
 use crate::output::restart::seal::checksum_of_bytes;
@@ -277,8 +277,7 @@ pub fn set_later_aside(
 pub fn set_later_frames_aside(world: &World, out: &Path, step: usize) -> Result<()> {
     on_root(world.comm(), || {
         for name in names_in(out)? {
-            let frame = ["points-", "grid-"].iter().find_map(|begin| number_of(&name, begin));
-            if frame.is_some_and(|number| number > step) {
+            if frame_of(&name).is_some_and(|number| number > step) {
                 let path = out.join(&name);
                 let aside = out.join(format!("{name}{SUPERSEDED}"));
                 fs::rename(&path, aside).map_err(|reason| cannot_write(&path, &reason))?;

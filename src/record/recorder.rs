@@ -9,6 +9,7 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::directory::ResultsDirectory;
 use crate::output::extent::{body_summaries, peak_memory};
+use crate::output::report;
 use crate::output::restart::run_state::RunState;
 use crate::output::series::grid_file::{GridFrame, GridSeries};
 use crate::output::series::point_field::PointField;
@@ -174,13 +175,14 @@ impl Recorder {
         };
         let fields = PointField::parse_list(&deck.output.fields)?;
         let (basis, dimension) = (deck.method.basis, deck.dimension);
+        let formats = &deck.output.formats;
         let goes_on = resume.as_ref().filter(|resume| resume.same_directory);
         let (history, residuals, points, grid) = match goes_on {
             None => (
                 History::create(&directory, layout)?,
                 Residuals::create(&directory)?,
-                PointsSeries::create(&directory, &fields, basis, dimension),
-                GridSeries::create(&directory),
+                PointsSeries::create(&directory, &fields, formats, basis, dimension),
+                GridSeries::create(&directory, formats),
             ),
             Some(Resume { state, .. }) => {
                 let count = |name: &str| state.count(name).map(|n| n as usize);
@@ -196,9 +198,15 @@ impl Recorder {
                     History::resume(&directory, layout, history, &mut log, comm)?,
                     Residuals::resume(&directory, residuals, &mut log, comm)?,
                     PointsSeries::resume(
-                        &directory, &fields, basis, dimension, step, &mut log, comm,
+                        &directory,
+                        &fields,
+                        formats,
+                        (basis, dimension),
+                        step,
+                        &mut log,
+                        comm,
                     )?,
-                    GridSeries::resume(&directory, step, &mut log, comm)?,
+                    GridSeries::resume(&directory, formats, step, &mut log, comm)?,
                 )
             }
         };
@@ -565,6 +573,15 @@ impl Recorder {
             cell_fields: &[],
         };
         self.grid.write(step, time, &frame, world.comm())
+    }
+
+    /// Writes `report.html`. That it could not be written is said, and no fault of the run.
+    pub fn write_report(&mut self, world: &World) {
+        if world.is_root()
+            && let Err(error) = report::write(self.directory.path())
+        {
+            self.log.say(&format!("warning: no report: {error}"));
+        }
     }
 
     /// Steps that this process has completed, without those before a restart.

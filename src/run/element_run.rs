@@ -10,6 +10,7 @@ use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::output::directory::{ELEMENT, Inputs, ResultsDirectory};
 use crate::output::extent::peak_memory;
+use crate::output::report as page;
 use crate::output::restart::run_lock::RunLock;
 use crate::output::summary::{Status, Summary};
 use crate::output::tables::csv_table::CsvTable;
@@ -78,6 +79,12 @@ pub fn run(
         ..Summary::default()
     };
     summary.write(&directory, comm)?;
+    if deck.output.report
+        && world.is_root()
+        && let Err(error) = page::write(directory.path())
+    {
+        log.say(&format!("warning: no report: {error}"));
+    }
     if let Some(row) = rows.last() {
         log.say(&format!(
             "  at the end    strains {:?}\n                p = {:.6e} Pa, q = {:.6e} Pa, J = {:.6}\n  \

@@ -3,6 +3,7 @@
 //! | step | file |
 //! |---|---|
 //! | the stages of a run, in order | `session.rs` |
+//! | command lines that run nothing | `aside.rs` |
 //! | a run of one point, without a grid | `element_run.rs` |
 //! | deck to points on their ranks | `setup.rs` |
 //! | parameters and state of the points' materials | `materials.rs` |
@@ -11,6 +12,7 @@
 //! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs`, `locking.rs` |
 //! | the process that MPI starts | `process.rs` |
 
+mod aside;
 mod element_run;
 mod locking;
 mod materials;

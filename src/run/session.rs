@@ -26,7 +26,7 @@ use crate::petsc::{files, known};
 
 use super::start_checks::formulas;
 use super::start_checks::support;
-use super::{element_run, plan, process, setup};
+use super::{aside, element_run, plan, process, setup};
 use crate::analysis::explicit::Explicit;
 use crate::analysis::implicit::{self, Implicit};
 use crate::analysis::{conditioning, solver, time_loop};
@@ -43,6 +43,10 @@ use crate::transfer::update;
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
 pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
+    let words: Vec<OsString> = words.into_iter().collect();
+    if cli::runs_nothing(&words) {
+        return aside::run(&words);
+    }
     process::before_start();
     start::before_mpi();
     let Some((universe, _)) = mpi::initialize_with_threading(mpi::Threading::Funneled) else {
@@ -51,17 +55,9 @@ pub fn run(words: impl IntoIterator<Item = OsString>) -> i32 {
     };
     petsc::install_panic_hook();
     let world = World::new(universe.world().duplicate());
-    let words: Vec<OsString> = words.into_iter().collect();
     let words = world.fail_together(same_on_all_ranks(&world, words));
-    let outcome = words.and_then(cli::parse).and_then(|arguments| match &arguments.print {
-        Some(text) => {
-            if world.is_root() {
-                println!("{}", text.trim_end());
-            }
-            Ok(())
-        }
-        None => with_world(&universe, &world, &arguments),
-    });
+    let outcome =
+        words.and_then(cli::parse).and_then(|arguments| with_world(&universe, &world, &arguments));
     match outcome {
         Ok(()) => 0,
         Err(error) => {
@@ -328,6 +324,9 @@ impl Start<'_> {
                 (ending, kind)
             }
         };
+        if run.model.deck.output.report {
+            run.recorder.write_report(world);
+        }
         run.recorder.log.say(&report::closing(&summary, &run.recorder.directory()));
         if ending.status == Status::Completed {
             return Ok(());

@@ -11,9 +11,9 @@ use super::{
 };
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
-    AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Frame, GhostScaling, GimpEdge,
-    Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume, PositionUpdate, StressUpdate,
-    Symmetry, Tangent, VerifyNorm,
+    AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Format, Frame, GhostScaling,
+    GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume, PositionUpdate,
+    StressUpdate, Symmetry, Tangent, VerifyNorm,
 };
 
 pub const SECTIONS: &[Section] = &[
@@ -334,6 +334,18 @@ pub const RESULT_SECTIONS: &[Section] = &[
                 Choices(FIELD_NAMES),
                 Default("[\"displacement\", \"stress\", \"plastic_strain\"]"),
                 "Point fields.",
+            ),
+            key(
+                "format",
+                Choices(Format::NAMES),
+                Default("[\"xdmf\"]"),
+                "Readers of frames, whose HDF5 files are written in any case. xdmf: `points.xdmf`, `domains.xdmf`, `grid.xdmf` beside them. vtkhdf: `points-*.h5` are VTKHDF files, too, listed in `points.vtkhdf.series`. vtu: `points-*.vtu` besides, listed in `points.pvd`.",
+            ),
+            key(
+                "report",
+                Special("true or false"),
+                Default("true"),
+                "Whether the run ends with `report.html`, one page for any browser. `mpm-par report DIR` makes it, too.",
             ),
             key("checkpoint", Table("output.checkpoint"), Optional("none"), "Checkpoints."),
         ],

@@ -2,11 +2,12 @@
 
 use crate::deck::expression::Expression;
 use crate::deck::fields::{self, FieldRank};
-use crate::deck::model::{AnalysisType, Checkpoint, Every, Output, Parallel, Verify};
+use crate::deck::model::{AnalysisType, Checkpoint, Every, Format, Output, Parallel, Verify};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{self, at_least};
 use crate::deck::tree::Value;
+use crate::deck::words::Words;
 
 pub fn verify(root: &Table<'_>, dimension: usize) -> Got<Vec<Verify>> {
     let mut names: Vec<String> = Vec::new();
@@ -76,6 +77,8 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
     let log = interval(table, "log", "output.log");
     let known = fields::names();
     let fields = table.choices("fields", &known);
+    let formats = table.choices("format", Format::NAMES);
+    let report = flag(table, "report");
     let checkpoint = table.table_if("checkpoint", |t| {
         let (every, minutes, keep) = (t.count_if("every"), t.number_if("minutes"), t.count("keep"));
         if !t.given("every") && !t.given("minutes") {
@@ -95,7 +98,20 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
         }),
         fields,
         checkpoint: checkpoint?,
+        formats: formats?.into_iter().map(|at| Format::WORDS[at].1).collect(),
+        report: report?,
     })
+}
+
+/// `true` or `false`; without the key true.
+fn flag(table: &Table<'_>, key: &str) -> Got<bool> {
+    match table.node(key) {
+        None => Ok(true),
+        Some(node) => match node.value {
+            Value::Boolean(flag) => Ok(flag),
+            _ => Err(table.wrong(key, node)),
+        },
+    }
 }
 
 /// A whole number of steps, or a table with seconds.

@@ -4,7 +4,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::hdf5_writer::FileWriter;
 use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfSeries};
-use crate::deck::model::Element;
+use crate::deck::model::{Element, Format};
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
 use crate::output::terminal::log::Log;
@@ -48,25 +48,32 @@ fn topology_of(element: Element) -> Topology {
 pub struct GridSeries {
     directory: ResultsDirectory,
     series: XdmfSeries,
+    /// `grid.xdmf` is written.
+    described: bool,
 }
 
 impl GridSeries {
-    pub fn create(directory: &ResultsDirectory) -> Self {
+    pub fn create(directory: &ResultsDirectory, formats: &[Format]) -> Self {
         let series = XdmfSeries::new(&directory.file("grid.xdmf"));
-        Self { directory: directory.clone(), series }
+        let described = formats.contains(&Format::Xdmf);
+        Self { directory: directory.clone(), series, described }
     }
 
     /// Continues the series of a run that is restarted after `last_step`. Nothing is written before
     /// [`Self::cut`].
     pub fn resume(
         directory: &ResultsDirectory,
+        formats: &[Format],
         last_step: usize,
         log: &mut Log,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
-        let series =
-            XdmfSeries::resume(&directory.file("grid.xdmf"), "grid-", last_step, log, comm)?;
-        Ok(Self { directory: directory.clone(), series })
+        let mut this = Self::create(directory, formats);
+        if this.described {
+            let path = directory.file("grid.xdmf");
+            this.series = XdmfSeries::resume(&path, "grid-", last_step, log, comm)?;
+        }
+        Ok(this)
     }
 
     /// [`XdmfSeries::cut`]
@@ -122,6 +129,13 @@ impl GridSeries {
             file.write_rows(name, 1, values)?;
             attribute(name, Center::Node, Number::Float, 1);
         }
+        for (name, unit, meaning) in [
+            ("coordinates", "m", "nodes, where the step was solved"),
+            ("displacement_increment", "m", "over the step"),
+            ("reaction", "N", "force held by the constraints"),
+        ] {
+            file.describe(name, unit, meaning)?;
+        }
         let rank = i64::from(comm.rank());
         file.write_rows("node_rank", 1, &vec![rank; nodes])?;
         attribute("node_rank", Center::Node, Number::Int, 1);
@@ -145,7 +159,7 @@ impl GridSeries {
             geometry: item(Number::Float, all_nodes, 3, "coordinates"),
             attributes,
         };
-        self.series.push(&snapshot, comm)
+        if self.described { self.series.push(&snapshot, comm) } else { Ok(()) }
     }
 }
 

@@ -117,6 +117,24 @@ impl<'c> FileWriter<'c> {
         self.lay_out(|file| write_text_attribute(file, name, text))
     }
 
+    /// Lets rank 0 add groups, links and attributes to the file; every rank gets the outcome.
+    pub fn arrange(&self, act: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> Result<()> {
+        self.lay_out(act)
+    }
+
+    /// Attaches unit and meaning to a dataset; an empty text is left out.
+    pub fn describe(&self, name: &str, unit: &str, description: &str) -> Result<()> {
+        self.lay_out(|file| {
+            let dataset = file.dataset(name)?;
+            for (key, text) in [("unit", unit), ("description", description)] {
+                if !text.is_empty() {
+                    write_text_attribute(&dataset, key, text)?;
+                }
+            }
+            Ok(())
+        })
+    }
+
     /// The row of the whole table at which this rank's `rows` rows start.
     pub fn first_row(&self, rows: usize) -> usize {
         self.place(rows).0
@@ -209,7 +227,7 @@ fn new_dataset<T: H5Type>(
 }
 
 /// A text of fixed length: one of variable length would lie elsewhere in the file.
-fn write_text_attribute(file: &hdf5::File, name: &str, text: &str) -> hdf5::Result<()> {
+fn write_text_attribute(file: &hdf5::Location, name: &str, text: &str) -> hdf5::Result<()> {
     // HDF5 knows no empty fixed-length text; padding is cut off on reading.
     let mut bytes = text.as_bytes().to_vec();
     bytes.resize(bytes.len().max(1), 0);

@@ -5,14 +5,19 @@
 //! | `points-*.h5`, `points.xdmf` | `points_file.rs`, `point_field.rs` |
 //! | `domains.xdmf` | `domains.rs` |
 //! | `grid-*.h5`, `grid.xdmf` | `grid_file.rs` |
+//! | `points-*.vtu`, `points.pvd`, `points.vtkhdf.series` | `vtu.rs`, `frame_list.rs` |
+//! | frames read by one process | `frames.rs` |
 //! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
 //! | XDMF time series | `xdmf.rs`, `growing_file.rs` |
 
 pub mod domains;
+pub mod frame_list;
+pub mod frames;
 pub mod grid_file;
 pub mod growing_file;
 pub mod hdf5_reader;
 pub mod hdf5_writer;
 pub mod point_field;
 pub mod points_file;
+pub mod vtu;
 pub mod xdmf;

@@ -165,6 +165,11 @@ fn line(words: &[String]) -> Result<String> {
     text.map_err(|reason| Error::File(format!("cannot compose a csv header: {reason}")))
 }
 
+/// Without a last row that has no end: a run that goes on may have written half of it.
+pub fn whole_rows(text: &str) -> &str {
+    text.rfind('\n').map_or("", |end| &text[..=end])
+}
+
 /// The header and the rows up to `mark`, and the number of the rows. By their number alone rows
 /// after a gap would be taken for those that are missing.
 fn kept(

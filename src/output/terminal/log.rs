@@ -122,7 +122,9 @@ impl Log {
             let erase = if std::mem::take(&mut self.transient) { ERASE_LINE } else { "" };
             // Nobody listens to a closed pipe; the run and its files go on.
             let mut out = std::io::stdout().lock();
-            let _ = writeln!(out, "{erase}{}", text.trim_end_matches('\n'));
+            let text = text.trim_end_matches('\n');
+            let text = if self.on_terminal { painted(text) } else { text.into() };
+            let _ = writeln!(out, "{erase}{text}");
             let _ = out.flush();
         }
     }
@@ -148,6 +150,15 @@ impl Log {
             Some(file) => drop(file.write_all(text.as_bytes())),
             None => self.unwritten.push_str(&text),
         }
+    }
+}
+
+/// A warning in yellow, unless the variable NO_COLOR is set (no-color.org).
+fn painted(text: &str) -> std::borrow::Cow<'_, str> {
+    let plain = std::env::var_os("NO_COLOR").is_some_and(|value| !value.is_empty());
+    match text.strip_prefix("warning") {
+        Some(rest) if !plain => format!("\x1b[33mwarning\x1b[0m{rest}").into(),
+        _ => text.into(),
     }
 }
 

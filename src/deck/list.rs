@@ -1,0 +1,91 @@
+//! What a deck can choose from, one line each.
+
+use super::fields::FIELDS;
+use super::schema;
+use super::templates::TEMPLATES;
+use crate::material::{CATALOGUE, state_variables};
+
+/// A line on each basis; a test holds it to the deck's words.
+const BASES: [(&str, &str); 4] = [
+    ("mpm", "points without domains, linear shape functions"),
+    ("gimp", "rectangular domains: smoother, no jumps where points cross cells"),
+    ("cpdi1", "parallelogram domains that follow F: large rotations, extension"),
+    ("cpdi2", "quadrilateral or hexahedral domains by their corners: large distortion"),
+];
+
+/// The same for analyses.
+const ANALYSES: [(&str, &str); 5] = [
+    ("quasi-static", "equilibrium under loads that grow in steps (Newton)"),
+    ("explicit", "dynamics in small steps, for impact and fast flow"),
+    ("implicit-dynamic", "dynamics in steps that a wave may cross (Newmark, Newton)"),
+    ("conditioning", "rigid motion over the grid: condition numbers, nothing solved"),
+    ("element-test", "one point under a laboratory path, without grid"),
+];
+
+/// Materials, bases, analyses, loads, fields and templates.
+pub fn list() -> String {
+    let mut out = String::new();
+    let mut part = |title: &str, rows: Vec<(String, String)>| {
+        let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
+        out.push_str(&format!("{title}\n"));
+        for (name, text) in rows {
+            out.push_str(format!("  {name:width$}  {text}").trim_end());
+            out.push('\n');
+        }
+        out.push('\n');
+    };
+    let pairs = |rows: &[(&str, &str)]| -> Vec<(String, String)> {
+        rows.iter().map(|(name, text)| (name.to_string(), text.to_string())).collect()
+    };
+    let models: Vec<(&str, &str)> =
+        CATALOGUE.iter().map(|entry| (entry.name, first_sentence(entry.doc))).collect();
+    part("materials ([material.NAME] model)", pairs(&models));
+    part("bases ([method] basis)", pairs(&BASES));
+    part("analyses ([analysis] type)", pairs(&ANALYSES));
+    let loads: Vec<(&str, &str)> = schema::section("load")
+        .keys
+        .iter()
+        .map(|key| (key.name, first_sentence(key.doc)))
+        .collect();
+    part("loads ([[load]])", pairs(&loads));
+    let mut fields: Vec<(String, String)> = FIELDS
+        .iter()
+        .map(|field| {
+            let meaning = if field.doc.is_empty() { field.name } else { field.doc };
+            (field.name.to_string(), format!("[{}] {meaning}", field.unit))
+        })
+        .collect();
+    fields.extend(state_variables().iter().map(|variable| {
+        let owners =
+            CATALOGUE.iter().filter(|entry| entry.state.iter().any(|s| s.name == variable.name));
+        let owners: Vec<&str> = owners.map(|entry| entry.name).collect();
+        (variable.name.to_string(), format!("[{}] state of {}", variable.unit, owners.join(", ")))
+    }));
+    part("fields ([output] fields, [[verify]], [[probe]])", fields);
+    let templates: Vec<(&str, &str)> = TEMPLATES.iter().map(|t| (t.name, t.title())).collect();
+    part("templates (--new NAME)", pairs(&templates));
+    out.push_str("More on any of these words and on every key: mpm-par --explain WORD");
+    out
+}
+
+fn first_sentence(text: &str) -> &str {
+    text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.')
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deck::model::{AnalysisType, Basis};
+
+    #[test]
+    fn every_choice_has_its_line() {
+        assert_eq!(BASES.map(|(name, _)| name), Basis::NAMES);
+        assert_eq!(ANALYSES.map(|(name, _)| name), AnalysisType::NAMES);
+        let text = list();
+        for name in CATALOGUE.iter().map(|entry| entry.name).chain(Basis::NAMES.iter().copied()) {
+            assert!(text.lines().any(|line| line.trim_start().starts_with(name)), "{name}");
+        }
+        let widest = text.lines().map(str::len).max().unwrap_or(0);
+        assert!(widest < 160, "{widest} columns");
+    }
+}
