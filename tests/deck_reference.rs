@@ -62,6 +62,7 @@ fn defaults_pass_their_own_checks() {
                     }
                 }
                 (Kind::Text, value) => assert!(value.is_str(), "{name}"),
+                (Kind::Flag, value) => assert!(value.is_bool(), "{name}"),
                 (Kind::Special(_), _) => {}
                 (kind, _) => panic!("{name}: no check for a default of {kind:?}"),
             }

@@ -143,6 +143,7 @@ fn faults(root: &Value, schema: &Value, value: &Value, at: &str, found: &mut Vec
         Some("object") => value.is_object(),
         Some("array") => value.is_array(),
         Some("string") => value.is_string(),
+        Some("boolean") => value.is_boolean(),
         Some("number") => value.is_number(),
         Some("integer") => value.is_i64() || value.is_u64(),
         Some(other) => panic!("type {other}"),

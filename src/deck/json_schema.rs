@@ -88,6 +88,7 @@ fn of_kind(kind: Kind, range: Range) -> Value {
     let expression = || json!({ "anyOf": [number(), { "type": "string" }] });
     match kind {
         Kind::Text => json!({ "type": "string" }),
+        Kind::Flag => json!({ "type": "boolean" }),
         Kind::Number => number(),
         Kind::Count => count(),
         Kind::Choice(words) => json!({ "enum": words }),

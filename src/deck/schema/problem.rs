@@ -1,8 +1,8 @@
 //! Keys of the analysis, the method and the grid, and of what is written.
 
 use super::Kind::{
-    Choice, Choices, Count, Counts, Named, Number, NumberOrVector, Points, Special, Table, Tables,
-    Text, Vector,
+    Choice, Choices, Count, Counts, Flag, Named, Number, NumberOrVector, Points, Special, Table,
+    Tables, Text, Vector,
 };
 use super::Need::{Default, Optional, Required};
 use super::{
@@ -343,7 +343,7 @@ pub const RESULT_SECTIONS: &[Section] = &[
             ),
             key(
                 "report",
-                Special("true or false"),
+                Flag,
                 Default("true"),
                 "Whether the run ends with `report.html`, one page for any browser. `mpm-par report DIR` makes it, too.",
             ),

@@ -78,7 +78,7 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
     let known = fields::names();
     let fields = table.choices("fields", &known);
     let formats = table.choices("format", Format::NAMES);
-    let report = flag(table, "report");
+    let report = table.flag_if("report");
     let checkpoint = table.table_if("checkpoint", |t| {
         let (every, minutes, keep) = (t.count_if("every"), t.number_if("minutes"), t.count("keep"));
         if !t.given("every") && !t.given("minutes") {
@@ -99,19 +99,8 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
         fields,
         checkpoint: checkpoint?,
         formats: formats?.into_iter().map(|at| Format::WORDS[at].1).collect(),
-        report: report?,
+        report: report?.unwrap_or(true),
     })
-}
-
-/// `true` or `false`; without the key true.
-fn flag(table: &Table<'_>, key: &str) -> Got<bool> {
-    match table.node(key) {
-        None => Ok(true),
-        Some(node) => match node.value {
-            Value::Boolean(flag) => Ok(flag),
-            _ => Err(table.wrong(key, node)),
-        },
-    }
 }
 
 /// A whole number of steps, or a table with seconds.

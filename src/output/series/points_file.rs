@@ -197,7 +197,7 @@ fn as_vtkhdf(
 ) -> Result<()> {
     file.arrange(|file| {
         let group = file.create_group("VTKHDF")?;
-        group.new_attr::<[i64; 2]>().create("Version")?.as_writer().write_scalar(&[1, 0])?;
+        group.new_attr::<i64>().shape(2).create("Version")?.as_writer().write_raw(&[1_i64, 0])?;
         let kind = FixedAscii::<16>::from_ascii(b"UnstructuredGrid");
         let kind = kind.map_err(|reason| hdf5::Error::from(reason.to_string()))?;
         group.new_attr::<FixedAscii<16>>().create("Type")?.as_writer().write_scalar(&kind)?;
