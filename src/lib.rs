@@ -16,6 +16,7 @@
 //! | a step's equations and their terms (Lagrangian eq. 27-29) | [`system`] |
 //! | external forces | [`loads`] |
 //! | surfaces of bodies and the points that carry them | [`surface`] |
+//! | rigid surfaces, gaps, friction | [`contact`] |
 //! | Ghost faces and their matrix (Ghost §3, §4) | [`ghost`] |
 //! | who owns what, migration | [`parallel`] |
 //! | strains, stress measures and tangents in three frames (Lagrangian §3-5, App. A) | [`mechanics`] |
@@ -32,6 +33,7 @@ pub mod amg;
 pub mod analysis;
 pub mod basis;
 pub mod cli;
+pub mod contact;
 pub mod deck;
 pub mod error;
 pub mod ghost;

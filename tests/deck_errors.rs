@@ -142,7 +142,7 @@ beam.toml:19:2: gird: unknown key \"gird\"
     |  ^^^^
    = did you mean \"grid\"?
    = known keys of the top level: title, analysis, method, ghost, grid, material, body, boundary, \
-load, verify, probe, output, parallel, petsc, conditioning, element_test
+load, rigid, contact, verify, probe, output, parallel, petsc, conditioning, element_test
 beam.toml: grid: missing section [grid]
    = Background grid."
     );

@@ -467,6 +467,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             residual += (action - self.internal_owned[dof]).powi(2);
             actions += action * action;
         }
+        actions += self.terms.iter().map(|term| term.squared_actions(self.at())).sum::<f64>();
         let sums = self.world.sum_slice(&[residual, actions]);
         (self.residual_norm, self.actions_norm) = (sums[0].sqrt(), sums[1].sqrt());
         match (self.residual_norm, self.actions_norm) {

@@ -13,6 +13,7 @@ use crate::system::model::Model;
 use crate::transfer::affine;
 use crate::transfer::refusal::{Cause, Halt};
 
+use super::explicit_contact::ContactSteps;
 use super::explicit_step::advance;
 use super::time_loop::{Analysis, Answer, Manner, Next};
 use super::time_steps::{TimeSteps, ledger_at_start, stability_limit};
@@ -25,6 +26,7 @@ pub struct Explicit<const D: usize> {
     ledger: Ledger,
     before: Snapshot<D>,
     solver: MassSolver,
+    contact: ContactSteps<D>,
 }
 
 impl<const D: usize> Explicit<D> {
@@ -38,7 +40,8 @@ impl<const D: usize> Explicit<D> {
         let (ledger, limit) = ledger_at_start(run);
         let steps = TimeSteps::new(&run.model.deck.analysis);
         let (before, solver) = (Snapshot::default(), MassSolver::default());
-        Ok(Explicit { steps, limit, ledger, before, solver })
+        let contact = ContactSteps::new(&run.model);
+        Ok(Explicit { steps, limit, ledger, before, solver, contact })
     }
 }
 
@@ -49,12 +52,14 @@ impl<const D: usize> Analysis<D> for Explicit<D> {
 
     fn restore(&mut self, state: &RunState) -> Result<()> {
         self.steps.restore(state)?;
+        self.contact.restore(state)?;
         self.ledger.restore(state)
     }
 
     fn state(&self) -> RunState {
         let mut state = RunState::new();
         self.steps.save(&mut state);
+        self.contact.save(&mut state);
         self.ledger.save(&mut state);
         state
     }
@@ -65,7 +70,8 @@ impl<const D: usize> Analysis<D> for Explicit<D> {
     }
 
     fn step(&mut self, run: &mut Run<D>, next: Next) -> std::result::Result<Solved<D>, Halt> {
-        let (mut solved, sums) = advance(run, &mut self.before, &mut self.solver, next.span)?;
+        let Explicit { before, solver, contact, .. } = self;
+        let (mut solved, sums) = advance(run, before, solver, contact, next.span)?;
         let entry = Entry::unite(run.world, &run.points, sums);
         let row = &mut solved.row;
         row.step = next.number;

@@ -11,6 +11,7 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::following::Following;
 use crate::system::terms::stress::StepPoints;
 
+use super::explicit_contact::ContactSteps;
 use super::explicit_nodes::{Forces, Motion, Nodes};
 use crate::mass::grid_mass::GridMass;
 use crate::mass::light_nodes::LightNodes;
@@ -24,16 +25,18 @@ use crate::system::model::Model;
 use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::affine::Affine;
 use crate::transfer::mapping::{self, Deformation, Pushed};
-use crate::transfer::refusal::Halt;
+use crate::transfer::refusal::{Cause, Halt, Refusal};
 use crate::transfer::transport::{self, Carrier};
 use crate::transfer::update::{self, Increments};
 
 /// One time step; the points end at their new state, not yet migrated, and `before` holds what was
-/// overwritten so far, after a failure too. The row lacks the ledger's columns. Collective.
+/// overwritten so far, after a failure too. `contact` goes on with a step that is done. The row
+/// lacks the ledger's columns. Collective.
 pub(crate) fn advance<const D: usize>(
     run: &mut Run<D>,
     before: &mut Snapshot<D>,
     solver: &mut MassSolver,
+    contact: &mut ContactSteps<D>,
     span: StepSpan,
 ) -> std::result::Result<(Solved<D>, StepSums), Halt> {
     let Run { world, model, points, clock, .. } = run;
@@ -65,9 +68,13 @@ pub(crate) fn advance<const D: usize>(
         None => Vec::new(),
     };
     let borne = supports_at_start(model, &mesh, points, span);
+    let mut pushing = contact.begin(world, model, &mesh, points, span)?;
+    if let Some(pushing) = &mut pushing {
+        pushing.force.iter_mut().zip(&pressed).for_each(|(sum, f)| *sum += f);
+    }
     let inertia = (&mass, light, solver);
     let mut nodes = Nodes::new(world, model, &mesh, &conditions, inertia, &external, dt)?;
-    nodes.pressed = &pressed;
+    nodes.pressed = pushing.as_ref().map_or(&pressed, |pushing| &pushing.force);
 
     let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;
     let carrier = carrier(model);
@@ -98,7 +105,13 @@ pub(crate) fn advance<const D: usize>(
     let (deformation, energies) = first.unzip();
     let mut made =
         clock.time(Phase::Update, || Ok(increments(step, &moved, deforming, deformation)))?;
+    if let Some(pushing) = &pushing
+        && let Some(what) = world.first_message(pushing.term.too_deep(points, &moved))
+    {
+        return Err(Refusal { cause: Cause::Penetration, what }.into());
+    }
     clock.time(Phase::Update, || Ok(refuse(world, model, &mesh, points, &mut made, &moved)))??;
+    let touching = pushing.as_ref().map(|pushing| pushing.term.finish_explicit(&moved));
 
     let mut residual = residual(&mass, &mesh, &acceleration, &pushed);
     for (r, taken) in residual.iter_mut().zip(&nodes.taken) {
@@ -115,6 +128,7 @@ pub(crate) fn advance<const D: usize>(
     };
     let work = point_work(&external, carried)
         + pressure_work
+        + touching.as_ref().map_or(0.0, |touching| touching.work)
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);
     let linear_iterations = nodes.inverse.iterations();
@@ -130,6 +144,9 @@ pub(crate) fn advance<const D: usize>(
             update::respond(&model.materials, made.straining(), points, Some(before))
         });
         update::move_points(&made.displacement, points, Some(before));
+        if let Some(touching) = &touching {
+            touching.keep_slip(points, Some(before));
+        }
         before.velocity.replace(&mut points.velocity, new_velocity);
         before.acceleration.replace(&mut points.acceleration, rate);
         if let Some(Affine { velocity_gradient, spread }) = affine {
@@ -140,7 +157,7 @@ pub(crate) fn advance<const D: usize>(
     })?;
 
     let reaction = at_held(&conditions, &residual);
-    let row = HistoryRow {
+    let mut row = HistoryRow {
         load_factor: span.factor_end,
         time: span.time_end,
         dt,
@@ -152,9 +169,13 @@ pub(crate) fn advance<const D: usize>(
         ),
         ..grid_side(world, &mesh, points)
     };
+    if let Some(touching) = &touching {
+        contact.book(world, touching, &mut row);
+    }
     let driven = mass.driven_energy(&mesh, &conditions.increment, dt);
     let sums = StepSums { energies, ghost, work, driven, overgrown };
-    Ok((Solved { row, mesh, displacement, reaction, moved_grid: None }, sums))
+    let poses = contact.poses(model, span);
+    Ok((Solved { row, mesh, displacement, reaction, moved_grid: None, poses }, sums))
 }
 
 /// What carries the points of this deck.

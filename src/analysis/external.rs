@@ -13,9 +13,9 @@ use crate::transfer::mapping;
 pub(super) struct Loads<const D: usize> {
     /// On the points at the start.
     pub points_start: Vec<[f64; D]>,
-    /// This rank's share of the forces that follow the motion at the start, at the local nodes; empty
-    /// without any.
-    pub pressed_start: Vec<f64>,
+    /// This rank's share of what acts on nodes at the start (forces that follow the motion, later
+    /// contact), at the local nodes; empty without any.
+    pub nodes_start: Vec<f64>,
     /// Of the owned degrees of freedom, here and below, with those that follow the motion.
     pub external_start: Vec<f64>,
     /// Those at the end are known once the step is solved.
@@ -34,17 +34,17 @@ impl<const D: usize> Loads<D> {
         let points_start = model.point_forces(world, points, span.factor_start, span.time_start)?;
         let points_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
         let mut external_start = owned_forces(world, mesh, &points_start)?;
-        let mut pressed_start = Vec::new();
+        let mut nodes_start = Vec::new();
         let following = Following::new(model, mesh, points, span.factor_start, span.time_start);
         if let Some(following) = following {
-            pressed_start = following.at_start(&mesh.pattern, mesh.numbering.len());
-            let mut owned = pressed_start.clone();
+            nodes_start = following.at_start(&mesh.pattern, mesh.numbering.len());
+            let mut owned = nodes_start.clone();
             mesh.numbering.halo.reverse_add(world, &mut owned, D)?;
             add(&mut external_start, 1.0, &owned);
         }
         Ok(Loads {
             external_start,
-            pressed_start,
+            nodes_start,
             external_end: owned_forces(world, mesh, &points_end)?,
             points_start,
         })

@@ -2,6 +2,7 @@
 //! Ghost §2.4) and implicit dynamics, which is the same with inertia ([`super::inertial`]). A step:
 //! locate, map, number, {assemble, solve}*, update.
 
+use crate::contact::motion::When;
 use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
 use crate::error::Result;
@@ -9,14 +10,17 @@ use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
 use crate::petsc::log::Phase;
 use crate::points::Points;
+use crate::record::contact::ContactTotals;
 use crate::record::context::Run;
 use crate::record::reactions::{at_held, reactions, supports, supports_at_start, with_supports};
 use crate::record::step::{Moment, Solved, grid_side};
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 use crate::system::step_system::{Coupling, Discretisation};
+use crate::system::terms::Term;
+use crate::system::terms::contact::ContactTerm;
 use crate::system::terms::surface::Borne;
-use crate::transfer::refusal::Halt;
+use crate::transfer::refusal::{Cause, Halt, Refusal};
 use crate::transfer::update;
 
 use super::equilibrium::StepEquations;
@@ -34,6 +38,7 @@ pub struct Implicit<const D: usize> {
     trials: Trials,
     /// Of the quasi-static analysis.
     totals: Totals,
+    contact: ContactTotals,
     /// `None` without inertia.
     dynamics: Option<Dynamics<D>>,
 }
@@ -51,6 +56,7 @@ impl<const D: usize> Implicit<D> {
             stepping: Stepping::new(steps, duration, analysis.on_failure, analysis.smallest_step),
             trials: Trials::default(),
             totals: Totals::default(),
+            contact: ContactTotals::new(run.model.contacts.pairs.len()),
             dynamics: dynamic.then(|| Dynamics::new(run)),
         }
     }
@@ -64,6 +70,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
     fn restore(&mut self, state: &RunState) -> Result<()> {
         self.stepping.restore(state)?;
         self.trials.restore(state);
+        self.contact.restore(state)?;
         match &mut self.dynamics {
             Some(dynamics) => dynamics.restore(state),
             None => self.totals.restore(state),
@@ -74,6 +81,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         let mut state = RunState::new();
         self.stepping.save(&mut state);
         self.trials.save(&mut state);
+        self.contact.save(&mut state);
         match &self.dynamics {
             Some(dynamics) => dynamics.save(&mut state),
             None => self.totals.save(&mut state),
@@ -99,6 +107,12 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let loads = Loads::of_step(world, model, points, &mesh, span)?;
             Ok((loads, mesh.nodes_left_out(world, model.deck.method.drop_below)))
         })?;
+        let contact = clock
+            .time(Phase::Assemble, || Ok(ContactTerm::new(model, &mesh, points, span, &[])))?;
+        if let (Some(contact), Some(_)) = (&contact, &self.dynamics) {
+            loads.nodes_start.resize(mesh.numbering.len() * D, 0.0);
+            contact.add_force_at_start(&mut loads.nodes_start);
+        }
         let inertial = match &mut self.dynamics {
             Some(dynamics) => {
                 let by = (span, &mut dynamics.solver);
@@ -107,7 +121,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             None => None,
         };
         let Run { clock, .. } = &mut *run;
-        let (mut driving, terms) = clock.time(Phase::Assemble, || {
+        let (mut driving, inertia) = clock.time(Phase::Assemble, || {
             Ok(match &inertial {
                 Some(inertial) => inertial.equations(&mesh, &loads),
                 None => (loads.external_end.clone(), Vec::new()),
@@ -115,6 +129,14 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         })?;
         let (conditions, left_out) = (&conditions, &left_out[..]);
         let share = 1.0 + run.model.deck.analysis.hht_alpha;
+        let mut terms: Vec<Box<dyn Term<D> + '_>> = Vec::new();
+        if let Some(contact) = &contact {
+            terms.push(Box::new(contact));
+        }
+        // Inertia scales what stands before it.
+        for term in inertia {
+            terms.push(term);
+        }
         let equations =
             StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
         let solved = newton::solve(run, &mesh, equations, &mut self.trials, next)?;
@@ -124,6 +146,11 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
 
         let borne = supports_in_step(run, &mesh, span, &displacement, inertial.as_ref());
         let Run { world, model, points, clock, .. } = &mut *run;
+        if let Some(contact) = &contact
+            && let Some(what) = world.first_message(contact.too_deep(points, &displacement))
+        {
+            return Err(Refusal { cause: Cause::Penetration, what }.into());
+        }
         let carry = || Ok(newton::carried(world, model, &mesh, points, &displacement, span));
         let Carried { made, moved_grid } = clock.time(Phase::Update, carry)??;
 
@@ -134,14 +161,19 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             Some(inertial) => inertial.supplied(model, &mesh, out_of_balance),
             None => (out_of_balance, [solved.internal_start, solved.internal]),
         };
+        let touching = contact.map(|contact| {
+            let shares = inertial.as_ref().map_or([0.0, 1.0], |inertial| inertial.shares());
+            contact.finish(&displacement, shares)
+        });
         let external = [&loads.external_start[..], &loads.external_end];
-        let work = work_of_step::<D>(
+        let mut work = work_of_step::<D>(
             conditions,
             &mesh.numbering,
             &displacement,
             external,
             [&ends[0], &ends[1]],
         );
+        work += touching.as_ref().map_or(0.0, |touching| touching.work);
         let rates = inertial.as_ref().map(|inertial| inertial.rates_at_end(&displacement));
         let mut before = self.dynamics.as_mut().map(|dynamics| &mut dynamics.before);
         let energies = clock.time(Phase::Update, || {
@@ -151,6 +183,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let (numbering, kept) = (&mesh.numbering, before.as_deref_mut());
             let updated = update::apply(model, numbering, &displacement, &made, points, kept);
             world.fail_together(updated)?;
+            if let Some(touching) = &touching {
+                touching.keep_slip(points, before.as_deref_mut());
+            }
             if let (Some(rates), Some(before)) = (of_points, before) {
                 before.velocity.replace(&mut points.velocity, rates.velocity);
                 before.acceleration.replace(&mut points.acceleration, rates.acceleration);
@@ -180,6 +215,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             ),
             ..grid_side(world, &mesh, points)
         };
+        if let Some(touching) = &touching {
+            self.contact.book(world, touching, &mut row);
+        }
         match (&mut self.dynamics, &inertial, &rates) {
             (Some(dynamics), Some(inertial), Some(rates)) => {
                 let sums = inertial.sums(&mesh, conditions, rates, energies, work);
@@ -195,7 +233,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             }
         }
         row.cuts = self.stepping.cuts;
-        Ok(Solved { row, mesh, displacement, reaction, moved_grid })
+        let end = When { load_factor: span.factor_end, time: span.time_end };
+        let poses = run.model.contacts.poses(end);
+        Ok(Solved { row, mesh, displacement, reaction, moved_grid, poses })
     }
 
     fn undo(&mut self, points: &mut Points<D>) -> bool {

@@ -119,7 +119,7 @@ impl InertialStep {
         let (share_at_start, balance_start) = clock.time(Phase::Assemble, || {
             let mut share =
                 mapping::force(step, &loads.points_start, &Default::default(), numbering.len());
-            add(share.as_flattened_mut(), 1.0, &loads.pressed_start);
+            add(share.as_flattened_mut(), 1.0, &loads.nodes_start);
             let mut balance = share.as_flattened().to_vec();
             numbering.halo.reverse_add(world, &mut balance, D)?;
             Ok((share, balance))
@@ -152,6 +152,17 @@ impl InertialStep {
         }
         let matrix = self.mass.scaled(mesh, newmark.stiffness());
         (driving, vec![Box::new(Inertia { share, matrix })])
+    }
+
+    /// Shares of the forces at both ends of the step in those that act over it.
+    pub fn shares(&self) -> [f64; 2] {
+        match self.newmark.alpha {
+            0.0 => {
+                let end = self.newmark.mean(&[0.0], &[1.0])[0];
+                [1.0 - end, end]
+            }
+            alpha => [-alpha, 1.0 + alpha],
+        }
     }
 
     /// What the boundaries supply in the mean of the step, and at both of its ends; `at_end`: what

@@ -9,6 +9,7 @@
 //!     finish it: frames, mesh, migration, row of the history, checkpoint
 //! ```
 
+use crate::contact::motion::When;
 use crate::error::{Error, Result};
 use crate::output::restart::run_state::RunState;
 use crate::petsc::log::Phase;
@@ -99,6 +100,8 @@ pub fn run<const D: usize>(run: &mut Run<D>, analysis: &mut impl Analysis<D>) ->
         }
         None => {
             run.frame(0, 0.0)?;
+            let start = run.model.contacts.poses(When { load_factor: 0.0, time: 0.0 });
+            run.recorder.rigid_frame(run.world, &run.model, &start, (0, 0.0))?;
             Some(0)
         }
     };
@@ -204,6 +207,7 @@ fn finish<const D: usize>(
         let Run { world, model, points, recorder, clock } = run;
         clock.time(Phase::Output, || {
             recorder.frame(world, number, label, points)?;
+            recorder.rigid_frame(world, model, &solved.poses, (number, label))?;
             recorder.grid_frame(world, &model.grid, &solved, number, label)
         })?;
     }

@@ -5,6 +5,7 @@
 //! 4 c^2 / h^2 with the lumped one, c the speed of pressure waves. Cut cells of a stabilised
 //! body come close to that (Ghost Figure 7); those of an unstabilised one do not matter, since
 //! the method starts each step from the points. A point may also not cross a cell in one step.
+//! The penalty of a contact adds to the stiffness of the outermost cells.
 //! `type = "conditioning"` gives the limit of the true eigenvalues for any position.
 
 use crate::deck::model::{Analysis, Mass};
@@ -120,12 +121,19 @@ pub fn stability_limit<const D: usize>(
         Mass::Lumped => 1.0,
     };
     let (mut rate, mut wave_energy) = (0.0f64, 0.0);
+    let springs: Vec<f64> =
+        (0..model.deck.bodies.len()).map(|body| model.contacts.stiffest(body) * h / 2.0).collect();
     for p in 0..points.len() {
         let modulus =
             local(&model.materials, points, p).model().wave_modulus(|| points.elastic_strain(p));
         let wave = modulus * points.volume(p) / points.mass[p];
         let speed = points.velocity[p].iter().map(|v| v * v).sum::<f64>().sqrt();
-        let held = 0.25 * h * h * held_frequency(model, points, p);
+        // A penalty holds a layer of half a cell: w^2 = 2 e / (rho h), beside 4 c^2 / h^2.
+        let spring = match springs[points.body[p] as usize] {
+            0.0 => 0.0,
+            stiffness => stiffness * points.volume(p) / points.mass[p],
+        };
+        let held = 0.25 * h * h * held_frequency(model, points, p) + spring;
         rate = rate.max((wave.abs() + held).sqrt() * factor + speed);
         wave_energy += points.mass[p] * wave.abs();
     }

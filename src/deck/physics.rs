@@ -83,9 +83,15 @@ fn may_be_extended(deck: &Deck) -> bool {
         | Load::BodyForce(all)
         | Load::Manufactured(all) => all.iter().any(of_factor),
     });
+    let rigid_totals = deck.rigids.iter().any(|rigid| {
+        let total = |value: &Expression| of_factor(value) || !value.depends_on_time();
+        let motion = &rigid.motion;
+        motion.displacement.iter().any(total)
+            || motion.rotation.as_ref().is_some_and(|rotation| total(&rotation.degrees))
+    });
     let dynamic =
         matches!(deck.analysis.kind, AnalysisType::Explicit | AnalysisType::ImplicitDynamic);
-    dynamic && !boundary_totals && !load_totals
+    dynamic && !boundary_totals && !load_totals && !rigid_totals
 }
 
 /// The first lines in which two such texts differ, `(first, second)`; `None` if they are equal.

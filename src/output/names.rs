@@ -16,6 +16,8 @@ pub const REPORT: &str = "report.html";
 /// Rows of `[[probe]]`.
 pub const PROBES: &str = "probes.csv";
 pub const RESIDUALS: &str = "residuals.csv";
+/// Series of the rigid bodies' surfaces.
+pub const RIGID: &str = "rigid.xdmf";
 pub const LOG: &str = "log.txt";
 pub const DECK: &str = "input.toml";
 pub const RESOLVED_DECK: &str = "resolved.toml";
@@ -38,7 +40,7 @@ pub const SERIES: &str = "points.vtkhdf.series";
 pub const SERIES_LIST_HEAD: &str = "{\"file-series-version\":\"1.0\",\"files\":[\n";
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [&str; 14] = [
+const NAMES: [&str; 15] = [
     SUMMARY,
     HISTORY,
     PROBES,
@@ -53,9 +55,10 @@ const NAMES: [&str; 14] = [
     "points.xdmf",
     "grid.xdmf",
     "domains.xdmf",
+    RIGID,
 ];
 /// `points-000005.h5` and its like.
-const NUMBERED: [&str; 3] = ["points-", "grid-", "checkpoint-"];
+const NUMBERED: [&str; 4] = ["points-", "grid-", "rigid-", "checkpoint-"];
 /// Digits of a frame's and a checkpoint's number, at least.
 const DIGITS: usize = 6;
 
@@ -89,7 +92,7 @@ pub fn number_of(name: &str, begin: &str) -> Option<usize> {
 
 /// Step of the frame that a file belongs to; `None` for other names.
 pub fn frame_of(name: &str) -> Option<usize> {
-    let hdf5 = ["points-", "grid-"].iter().find_map(|begin| number_of(name, begin));
+    let hdf5 = ["points-", "grid-", "rigid-"].iter().find_map(|begin| number_of(name, begin));
     hdf5.or_else(|| number_of(&format!("{}.h5", name.strip_suffix(".vtu")?), "points-"))
 }
 
@@ -114,6 +117,8 @@ mod tests {
             "checkpoint-000012.h5.superseded",
             "points-000012.h5.superseded",
             "checkpoint-000012.h5.passed-over",
+            "rigid-000003.h5",
+            "rigid.xdmf",
             "points.xdmf.partial",
             "points.xdmf.partial.partial",
             "points-000005.vtu",

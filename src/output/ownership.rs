@@ -10,8 +10,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::names::{
-    DECK, ELEMENT, HISTORY, LOG, PROBES, PVD, PVD_HEAD, REPORT, RESIDUALS, RESOLVED_DECK, SERIES,
-    SERIES_HEAD, SERIES_LIST_HEAD, SUMMARY, names_in,
+    DECK, ELEMENT, HISTORY, LOG, PROBES, PVD, PVD_HEAD, REPORT, RESIDUALS, RESOLVED_DECK, RIGID,
+    SERIES, SERIES_HEAD, SERIES_LIST_HEAD, SUMMARY, names_in,
 };
 use super::report;
 use super::restart::seal;
@@ -37,7 +37,7 @@ enum Proof {
 }
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [(&str, Proof); 14] = [
+const NAMES: [(&str, Proof); 15] = [
     (SUMMARY, Proof::Summary),
     (HISTORY, Proof::Begins(TABLE_HEAD)),
     (RESIDUALS, Proof::Begins(TABLE_HEAD)),
@@ -52,6 +52,7 @@ const NAMES: [(&str, Proof); 14] = [
     ("points.xdmf", Proof::Begins(SERIES_HEAD)),
     ("grid.xdmf", Proof::Begins(SERIES_HEAD)),
     ("domains.xdmf", Proof::Begins(SERIES_HEAD)),
+    (RIGID, Proof::Begins(SERIES_HEAD)),
 ];
 /// The files of a folder that have names of ours, sorted.
 #[derive(Debug, Default, PartialEq, Eq)]

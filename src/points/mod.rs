@@ -56,6 +56,9 @@ macro_rules! point_fields {
             pub state: Named,
             /// Parameters of the body's material where they vary in space.
             pub parameters: Named,
+            /// Elastic slip of contacts with friction, m, corner by corner, in the frame of the rigid
+            /// body.
+            pub slip: Named,
             /// `velocity_gradient` and `spread` are carried: an affine transfer.
             pub affine: bool,
         }
@@ -69,9 +72,12 @@ macro_rules! point_fields {
             /// Words of one packed point without what its material asks for: id, body, the fields.
             pub fn base_words() -> usize { 2 $( + $words )* }
 
-            /// Words of one packed point: [`Self::base_words`], then state and parameters.
+            /// Words of one packed point: [`Self::base_words`], then state, parameters and slip.
             pub fn record_words(&self) -> usize {
-                Self::base_words() + self.state.stride() + self.parameters.stride()
+                Self::base_words()
+                    + self.state.stride()
+                    + self.parameters.stride()
+                    + self.slip.stride()
             }
 
             /// Appends point `p` to `out` as words; integers travel as their bits.
@@ -84,6 +90,7 @@ macro_rules! point_fields {
                 } )*
                 out.extend_from_slice(self.state.whole(p));
                 out.extend_from_slice(self.parameters.whole(p));
+                out.extend_from_slice(self.slip.whole(p));
             }
 
             /// Appends the point held in `words` (length [`Self::record_words`]).
@@ -97,6 +104,7 @@ macro_rules! point_fields {
                 } )*
                 self.state.take(&mut rest);
                 self.parameters.take(&mut rest);
+                self.slip.take(&mut rest);
             }
 
             /// Body of a packed point.
@@ -111,6 +119,7 @@ macro_rules! point_fields {
                 $( self.$name.truncate(count); )*
                 self.state.truncate(count);
                 self.parameters.truncate(count);
+                self.slip.truncate(count);
             }
 
             /// Keeps the points `order[0], order[1], ...` in that order and drops the others.
@@ -121,6 +130,7 @@ macro_rules! point_fields {
                 $( gather.apply(&mut self.$name); )*
                 self.state.gather(&mut gather);
                 self.parameters.gather(&mut gather);
+                self.slip.gather(&mut gather);
             }
 
             /// Moves points to other places, and drops those beyond the last.
@@ -130,6 +140,7 @@ macro_rules! point_fields {
                 $( moves.apply(&mut self.$name); )*
                 self.state.rearrange(moves);
                 self.parameters.rearrange(moves);
+                self.slip.rearrange(moves);
             }
 
             /// Makes room for this many more points: by little where there is none, as an array
@@ -146,6 +157,7 @@ macro_rules! point_fields {
                 } )*
                 self.state.reserve(more);
                 self.parameters.reserve(more);
+                self.slip.reserve(more);
             }
 
             /// Appends field `name` of point `p` to `out`; false if there is no such field.
@@ -169,6 +181,8 @@ macro_rules! point_fields {
             $( pub $name: Former<$type>, )*
             /// State variables, row by row.
             pub state: Former<f64>,
+            /// Elastic slip, row by row.
+            pub slip: Former<f64>,
         }
 
         impl<const D: usize> Snapshot<D> {
@@ -176,12 +190,14 @@ macro_rules! point_fields {
             pub fn begin(&mut self) {
                 $( self.$name.forget(); )*
                 self.state.forget();
+                self.slip.forget();
             }
 
             /// The points as they were when the step began; they have not been reordered since.
             pub fn restore(&mut self, points: &mut Points<D>) {
                 $( self.$name.give_back(&mut points.$name); )*
                 self.state.give_back(&mut points.state.values);
+                self.slip.give_back(&mut points.slip.values);
             }
         }
     };

@@ -7,6 +7,7 @@
 //! | rows, frames, summary | `recorder.rs` | |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
+//! | forces and states of contacts | `contact.rs` | formulations.md B.5 |
 //! | figures of merit | `verify.rs` | Lagrangian eq. 42 |
 //! | watched points | `probes.rs` | |
 //! | wall time by phase | `clock.rs` | |
@@ -14,6 +15,7 @@
 
 pub mod checkpointing;
 pub mod clock;
+pub mod contact;
 pub mod context;
 pub mod ledger;
 pub mod probes;

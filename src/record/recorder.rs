@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use super::contact::surfaces;
+use crate::contact::pose::Pose;
 use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every, Symmetry};
 use crate::error::{Error, Result};
@@ -14,6 +16,7 @@ use crate::output::restart::run_state::RunState;
 use crate::output::series::grid_file::{GridFrame, GridSeries};
 use crate::output::series::point_field::PointField;
 use crate::output::series::points_file::PointsSeries;
+use crate::output::series::rigid_file::RigidSeries;
 use crate::output::summary::Summary;
 use crate::output::summary::{Communication, Count, Status};
 use crate::output::tables::csv_table::Mark;
@@ -25,12 +28,12 @@ use crate::output::terminal::progress::{Interval, NewtonReport, Progress, StepRe
 use crate::parallel::World;
 use crate::parallel::balance::{Balance, BalanceReport};
 use crate::points::Points;
+use crate::system::model::Model;
 
 use super::checkpointing::Checkpointer;
 use super::clock::Clock;
 use super::probes::{Followed, Probes};
 use super::step::{Moment, Solved};
-use crate::system::model::Model;
 
 /// Open files and running totals of one run.
 pub struct Recorder {
@@ -41,6 +44,8 @@ pub struct Recorder {
     probes: Option<Probes>,
     points: PointsSeries,
     grid: GridSeries,
+    /// Of a deck with rigid bodies.
+    rigid: Option<RigidSeries>,
     progress: Progress,
     every: Every,
     last_frame: f64,
@@ -171,6 +176,12 @@ impl Recorder {
             whole: deck.analysis.symmetry == Symmetry::Axisymmetric,
             dimension: deck.dimension,
             boundaries: deck.boundaries.iter().map(|boundary| boundary.name.clone()).collect(),
+            rigids: deck.rigids.iter().map(|rigid| rigid.name.clone()).collect(),
+            free: {
+                let free = deck.rigids.iter().filter(|rigid| rigid.free.is_some());
+                free.map(|rigid| rigid.name.clone()).collect()
+            },
+            contacts: deck.contacts.iter().map(|contact| contact.name.clone()).collect(),
             conditioning: deck.analysis.kind == AnalysisType::Conditioning,
         };
         let fields = PointField::parse_list(&deck.output.fields)?;
@@ -210,6 +221,14 @@ impl Recorder {
                 )
             }
         };
+        let rigid = match (deck.rigids.is_empty(), goes_on) {
+            (true, _) => None,
+            (false, None) => Some(RigidSeries::create(&directory)),
+            (false, Some(Resume { state, .. })) => {
+                let step = state.count("recorder.steps")? as usize;
+                Some(RigidSeries::resume(&directory, step, &mut log, comm)?)
+            }
+        };
         let state = goes_on.map(|resume| &resume.state);
         let probes = Probes::new(world, deck, &followed, &directory, state, &mut log)?;
         let same_directory = goes_on.is_some();
@@ -225,6 +244,7 @@ impl Recorder {
             probes,
             points,
             grid,
+            rigid,
             directory,
             progress: Progress::new(interval, 0.0, 0.0),
             every: deck.output.every,
@@ -264,6 +284,7 @@ impl Recorder {
         self.log.attach(&self.directory, self.same_directory, comm)?;
         self.points.cut(comm)?;
         self.grid.cut(comm)?;
+        self.rigid.as_mut().map_or(Ok(()), |rigid| rigid.cut(comm))?;
         self.history.table.open(comm)?;
         self.probes.as_mut().map_or(Ok(()), |probes| probes.table.open(comm))?;
         self.residuals.table.open(comm)
@@ -524,6 +545,19 @@ impl Recorder {
         points: &Points<D>,
     ) -> Result<()> {
         self.points.write(step, time, points, world.comm())
+    }
+
+    /// Writes the surfaces of the rigid bodies in their `poses`.
+    pub fn rigid_frame<const D: usize>(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        poses: &[Pose<D>],
+        (step, time): (usize, f64),
+    ) -> Result<()> {
+        let Some(series) = &mut self.rigid else { return Ok(()) };
+        let frame = surfaces(model, poses);
+        series.write(step, time, &frame, world.comm())
     }
 
     /// Writes the active grid of the step just solved, on the `grid` that it was solved on.

@@ -1,5 +1,6 @@
 //! A finished step as the record sees it.
 
+use crate::contact::pose::Pose;
 use crate::grid::Grid;
 use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
@@ -27,6 +28,8 @@ pub struct Solved<const D: usize> {
     pub reaction: Vec<f64>,
     /// The mesh where it goes after the step, if it moves.
     pub moved_grid: Option<Grid<D>>,
+    /// Of the rigid bodies at the end.
+    pub poses: Vec<Pose<D>>,
 }
 
 /// What a history row says of the grid side, the rest of the row at its defaults. Collective.

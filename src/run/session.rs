@@ -24,6 +24,7 @@ use crate::petsc::log::Stages;
 use crate::petsc::{self, Session};
 use crate::petsc::{files, known};
 
+use super::start_checks::contact;
 use super::start_checks::formulas;
 use super::start_checks::support;
 use super::{aside, element_run, plan, process, setup};
@@ -213,7 +214,10 @@ impl Start<'_> {
             other => other,
         })?;
         let mut warnings = match resume {
-            None => formulas::check(world, &model, &points, &active.1)?,
+            None => {
+                contact::require_apart(world, &model, &points)?;
+                formulas::check(world, &model, &points, &active.1)?
+            }
             Some(_) => Vec::new(),
         };
         let first = implicit::first_span(&model.deck);

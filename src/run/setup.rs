@@ -1,6 +1,9 @@
 //! From a checked deck to points on their ranks: seed, partition, migrate, place point forces;
 //! or the same from a checkpoint.
 
+use std::sync::Arc;
+
+use crate::contact::Contacts;
 use crate::deck::expression::Expression;
 use crate::deck::model::{self, Initial, Load};
 use crate::deck::{Deck, rough};
@@ -12,10 +15,10 @@ use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
 use crate::parallel::nearest::nearest_point;
 use crate::parallel::{self, Partition, World};
-use crate::points::Points;
 use crate::points::overlap;
 use crate::points::seed::{self, CellByCell};
 use crate::points::share::Share;
+use crate::points::{Named, Points};
 
 use super::materials::{self, Overview};
 use super::start_checks::memory;
@@ -44,7 +47,9 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     hold_constant_forces(&deck, &mut found, &mut points);
     let materials = materials::of_bodies(&deck);
     materials::equip(world, &deck, &materials, &mut points)?;
-    Ok((model_of(world, deck, grid, partition, materials, found, &points)?, points))
+    let model = model_of(world, deck, grid, partition, materials, found, &points)?;
+    points.slip = Named::zeros(model.contacts.slip_names(&model.deck), points.len());
+    Ok((model, points))
 }
 
 /// The model and this rank's points as a checkpoint holds them: the stored partition where it
@@ -73,7 +78,14 @@ pub fn restore<const D: usize>(
     let mut found = find_carriers(world, &deck, &grid, &points)?;
     // The points have brought theirs.
     hold_constant_forces(&deck, &mut found, &mut Points::<D>::default());
-    Ok((model_of(world, deck, grid, partition, materials, found, &points)?, points))
+    let model = model_of(world, deck, grid, partition, materials, found, &points)?;
+    let names = model.contacts.slip_names(&model.deck);
+    let slips = names.iter().any(|names| !names.is_empty());
+    if slips && points.slip.names() != names {
+        let what = "the checkpoint holds no slip of this deck's contacts: it cannot be continued";
+        return Err(Error::File(what.into()));
+    }
+    Ok((model, points))
 }
 
 /// Everything that stays the same while points move. Collective.
@@ -104,7 +116,8 @@ fn model_of<const D: usize>(
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
     let loads = loads::of_deck(&deck.loads, found, grid.cell_size())?;
     let supports = surfaces::supports(world, &deck, points, grid.cell_size())?;
-    let symmetric = symmetric && loads.iter().all(|load| load.symmetric());
+    let contacts = Arc::new(Contacts::of_deck(&deck, &stiffness, grid.cell_size())?);
+    let symmetric = symmetric && contacts.symmetric() && loads.iter().all(|load| load.symmetric());
     let balance = Balance::default();
     Ok(Model {
         deck,
@@ -116,6 +129,7 @@ fn model_of<const D: usize>(
         symmetric,
         loads,
         supports,
+        contacts,
         manufactured,
         balance,
     })

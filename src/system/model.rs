@@ -1,5 +1,8 @@
 //! The deck made computable: grid, partition, materials, penalties and loads of a run.
 
+use std::sync::Arc;
+
+use crate::contact::Contacts;
 use crate::deck::Deck;
 use crate::deck::model::{Locking, Tangent};
 use crate::error::Result;
@@ -24,12 +27,13 @@ pub struct Model<const D: usize> {
     pub penalties: Vec<Penalty>,
     /// Mean stiffness scale of each body, Pa: what Ghost stiffness and penalties are factors of.
     pub stiffness: Vec<f64>,
-    /// Whether the tangents of all materials and loads are symmetric in every state.
+    /// Whether the tangents of all materials, loads and contacts are symmetric in every state.
     pub symmetric: bool,
     /// In the order of the deck.
     pub loads: Vec<Box<dyn Load<D>>>,
     /// Surfaces that are held off the grid's nodes.
     pub supports: Vec<Support<D>>,
+    pub contacts: Arc<Contacts<D>>,
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
     pub balance: Balance,

@@ -17,6 +17,8 @@ pub enum Cause {
     Domain,
     /// A cell of a moving mesh would turn over.
     Cell,
+    /// A rigid surface would reach a cell deep into a body.
+    Penetration,
 }
 
 /// A step that cannot be applied.

@@ -6,11 +6,13 @@
 //! | `problem.rs` | keys of the analysis: analysis, method, ghost, grid, outputs |
 //! | `materials.rs` | keys of materials, from what the models declare |
 //! | `bodies.rs` | keys of what is analysed: bodies, shapes, boundaries, loads |
+//! | `contact.rs` | keys of rigid bodies and contact |
 //!
 //! Known keys, type and range checks, defaults, the resolved deck and `docs/guide/deck.md` all come
 //! from here.
 
 mod bodies;
+mod contact;
 pub mod materials;
 mod problem;
 
@@ -173,7 +175,8 @@ pub struct Section {
 /// All sections, in the order of the documentation.
 pub fn sections() -> impl Iterator<Item = &'static Section> {
     let problem = problem::SECTIONS.iter().chain(materials::sections());
-    problem.chain(bodies::SECTIONS).chain(problem::RESULT_SECTIONS)
+    let analysed = bodies::SECTIONS.iter().chain(contact::SECTIONS);
+    problem.chain(analysed).chain(problem::RESULT_SECTIONS)
 }
 
 /// The section of that name. Names are fixed in this module, so that it always exists.

@@ -38,6 +38,10 @@ pub const SECTIONS: &[Section] = &[
                 .read_by(&[ON_GRID]),
             key("load", Tables("load"), Optional("none"), "Forces.")
                 .read_by(&[LOADED]),
+            key("rigid", Tables("rigid"), Optional("none"), "Rigid bodies.")
+                .read_by(&[LOADED]),
+            key("contact", Tables("contact"), Optional("none"), "Which bodies touch which rigid bodies.")
+                .read_by(&[LOADED]),
             key("verify", Tables("verify"), Optional("none"), "Figures of merit.")
                 .read_by(&[ON_GRID]),
             key("probe", Tables("probe"), Optional("none"), "Points that are watched.")

@@ -53,6 +53,8 @@ pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
         bodies: Vec::new(),
         boundaries: Vec::new(),
         loads: Vec::new(),
+        rigids: Vec::new(),
+        contacts: Vec::new(),
         verify: Vec::new(),
         probes: Vec::new(),
         output: basics.output?,

@@ -12,6 +12,7 @@
 //! | `shapes.rs` | body.shape |
 //! | `conditions.rs` | boundary, load |
 //! | `surfaces.rs` | boundary.surface, and the surfaces of loads |
+//! | `contact.rs` | rigid, contact |
 //! | `restraint.rs` | whether rigid motion is held |
 //! | `probes.rs` | probe |
 //! | `results.rs` | verify, output, parallel |
@@ -21,6 +22,7 @@ mod analysis;
 mod axisymmetry;
 mod bodies;
 mod conditions;
+mod contact;
 mod element_test;
 mod ghost;
 mod grid;
@@ -74,6 +76,8 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let names = bodies::names(&root);
     let boundaries = conditions::boundaries(&root, &world, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
+    let rigids = contact::rigids(&root, dimension, boundaries.as_deref().ok());
+    let contacts = contact::contacts(&root, rigids.as_deref().ok(), &names);
     let verify = results::verify(&root, dimension);
     let probes = probes::probes(&root, dimension, &names);
     if let (Ok(method), Ok(boundaries)) = (&method, &boundaries) {
@@ -83,7 +87,11 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         });
         grid_problems?;
     }
-    if let (Ok(analysis), Ok(boundaries), Ok(loads)) = (&analysis, &boundaries, &loads) {
+    // What a rigid body holds is known once its corners are.
+    let touched = !matches!(&contacts, Ok(contacts) if contacts.is_empty());
+    if let (Ok(analysis), Ok(boundaries), Ok(loads), false) =
+        (&analysis, &boundaries, &loads, touched)
+    {
         restraint::check(&root, analysis, (boundaries, loads), dimension)?;
     }
     let (analysis, method) = (analysis?, method?);
@@ -99,6 +107,8 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         bodies: bodies?,
         boundaries: boundaries?,
         loads: loads?,
+        rigids: rigids?,
+        contacts: contacts?,
         verify: verify?,
         probes: probes?,
         output: output?,

@@ -10,6 +10,7 @@
 //! | `points.id`, `points.body`, `points.FIELD` | points | rank after rank, in their order there |
 //! | `text.state` | bodies | names of the state variables of each body's points, if any has some |
 //! | `points.state` | points | their values, in that order |
+//! | `text.slip`, `points.slip` | bodies, points | likewise of contacts with friction |
 //! | `sums` | datasets | checksum of each dataset above, over its rows, from memory |
 //!
 //! Format 1 had no state variables, and the elastic strain b_e in place of b_e - 1: it is read too.
@@ -105,11 +106,13 @@ impl<const D: usize> Checkpoint<'_, D> {
             }
             out.rows(&dataset_of(name), words, &values)?;
         }
-        if points.state.stride() > 0 {
-            let names: Vec<String> =
-                points.state.names().iter().map(|names| names.join(" ")).collect();
-            out.text("text.state", &names.join("\n"))?;
-            out.rows("points.state", points.state.stride(), &points.state.values)?;
+        for (kind, named) in [("state", &points.state), ("slip", &points.slip)] {
+            if named.stride() > 0 {
+                let names: Vec<String> =
+                    named.names().iter().map(|names| names.join(" ")).collect();
+                out.text(&format!("text.{kind}"), &names.join("\n"))?;
+                out.rows(&dataset_of(kind), named.stride(), &named.values)?;
+            }
         }
         let Writer { file, sums, .. } = out;
         let own = if comm.rank() == 0 { &sums[..] } else { &[] };
@@ -359,14 +362,18 @@ impl Reader<'_> {
             }
             points.unpack(&record);
         }
-        if self.file.has("points.state") {
-            let names = self.text("text.state")?;
-            let words = |line: &str| line.split_whitespace().map(String::from).collect();
-            points.state = Named::new(names.split('\n').map(words).collect());
-            if self.file.shape("points.state")? != (total, points.state.stride()) {
-                return Err(Error::File("its state variables are not those it names".into()));
+        for (kind, named) in [("state", &mut points.state), ("slip", &mut points.slip)] {
+            let dataset = dataset_of(kind);
+            if !self.file.has(&dataset) {
+                continue;
             }
-            points.state.values = self.rows::<f64>("points.state", first, rows)?;
+            let names = self.text(&format!("text.{kind}"))?;
+            let words = |line: &str| line.split_whitespace().map(String::from).collect();
+            *named = Named::new(names.split('\n').map(words).collect());
+            if self.file.shape(&dataset)? != (total, named.stride()) {
+                return Err(Error::File(format!("its {dataset} is not what it names")));
+            }
+            named.values = self.rows::<f64>(&dataset, first, rows)?;
         }
         Ok(points)
     }

@@ -7,6 +7,7 @@
 //! | `grid-*.h5`, `grid.xdmf` | `grid_file.rs` |
 //! | `points-*.vtu`, `points.pvd`, `points.vtkhdf.series` | `vtu.rs`, `frame_list.rs` |
 //! | frames read by one process | `frames.rs` |
+//! | `rigid-*.h5`, `rigid.xdmf` | `rigid_file.rs` |
 //! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
 //! | XDMF time series | `xdmf.rs`, `growing_file.rs` |
 
@@ -19,5 +20,6 @@ pub mod hdf5_reader;
 pub mod hdf5_writer;
 pub mod point_field;
 pub mod points_file;
+pub mod rigid_file;
 pub mod vtu;
 pub mod xdmf;

@@ -42,6 +42,7 @@ pub struct DataItem {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Topology {
     Polyvertex,
+    Segment,
     Triangle,
     Quadrilateral,
     Tetrahedron,
@@ -52,6 +53,7 @@ impl Topology {
     fn name(self) -> &'static str {
         match self {
             Topology::Polyvertex => "Polyvertex",
+            Topology::Segment => "Polyline",
             Topology::Triangle => "Triangle",
             Topology::Quadrilateral => "Quadrilateral",
             Topology::Tetrahedron => "Tetrahedron",
@@ -62,6 +64,7 @@ impl Topology {
     pub fn nodes_per_element(self) -> usize {
         match self {
             Topology::Polyvertex => 1,
+            Topology::Segment => 2,
             Topology::Triangle => 3,
             Topology::Quadrilateral | Topology::Tetrahedron => 4,
             Topology::Hexahedron => 8,

@@ -16,6 +16,11 @@ pub struct Layout {
     pub whole: bool,
     /// Names of the deck's boundary entries, in deck order.
     pub boundaries: Vec<String>,
+    /// Names of the deck's rigid bodies and contacts, in deck order.
+    pub rigids: Vec<String>,
+    /// Those of the rigid bodies that move freely.
+    pub free: Vec<String>,
+    pub contacts: Vec<String>,
     /// A conditioning run.
     pub conditioning: bool,
 }
@@ -52,6 +57,16 @@ pub struct HistoryRow {
     pub angular_momentum: [f64; 3],
     /// One per entry of [`Layout::boundaries`].
     pub reactions: Vec<Reaction>,
+    /// One per entry of [`Layout::rigids`]: what it exerts; it holds nothing.
+    pub rigids: Vec<Reaction>,
+    /// One per entry of [`Layout::free`].
+    pub free: Vec<FreeState>,
+    /// One per entry of [`Layout::contacts`].
+    pub contacts: Vec<ContactState>,
+    /// In the penalties of contacts.
+    pub energy_contact: f64,
+    /// Dissipated by friction so far.
+    pub dissipation_friction: f64,
     pub ghost_faces: usize,
     pub populated_cells: usize,
     /// Step cuts so far.
@@ -76,6 +91,30 @@ pub struct Reaction {
     pub torque: f64,
     /// Volume of the material that its nodes hold, m3 (m2 in plane strain).
     pub held: f64,
+}
+
+/// A contact at the end of a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct ContactState {
+    /// m2 (m in 2D)
+    pub area: f64,
+    /// So far, the mean over the area in contact, m.
+    pub slip: f64,
+    /// Depth of the deepest corner, m.
+    pub gap_max: f64,
+}
+
+/// A rigid body that moves freely, at the end of a step.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct FreeState {
+    /// Centre of mass, m.
+    pub centre: [f64; 3],
+    /// m/s
+    pub velocity: [f64; 3],
+    /// 1/s
+    pub spin: [f64; 3],
+    /// Kinetic, J.
+    pub energy: f64,
 }
 
 /// Condition numbers and stability limits of one position of the bodies.
@@ -129,6 +168,39 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
         cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
         cell(format!("reaction.{name}.torque"), torque, reaction.torque);
         cell(format!("reaction.{name}.held"), unit("m3", "m2"), reaction.held);
+    }
+    for (index, name) in layout.rigids.iter().enumerate() {
+        let reaction = row.rigids.get(index).copied().unwrap_or_default();
+        for (axis, value) in axes.iter().zip(reaction.force).take(layout.dimension) {
+            cell(format!("reaction.{name}.{axis}"), force, value);
+        }
+        cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
+        cell(format!("reaction.{name}.torque"), torque, reaction.torque);
+    }
+    for (index, name) in layout.contacts.iter().enumerate() {
+        let state = row.contacts.get(index).copied().unwrap_or_default();
+        cell(format!("contact.{name}.area"), unit("m2", "m"), state.area);
+        cell(format!("contact.{name}.slip"), "m", state.slip);
+        cell(format!("contact.{name}.gap_max"), "m", state.gap_max);
+    }
+    for (index, name) in layout.free.iter().enumerate() {
+        let state = row.free.get(index).copied().unwrap_or_default();
+        let along = || axes.iter().enumerate().take(layout.dimension);
+        for (a, axis) in along() {
+            cell(format!("rigid.{name}.{axis}"), "m", state.centre[a]);
+        }
+        for (a, axis) in along() {
+            cell(format!("rigid.{name}.velocity_{axis}"), "m/s", state.velocity[a]);
+        }
+        let turns = if plane { 2..3 } else { 0..3 };
+        for (a, axis) in axes.iter().enumerate().filter(|(a, _)| turns.contains(a)) {
+            cell(format!("rigid.{name}.spin_{axis}"), "1/s", state.spin[a]);
+        }
+        cell(format!("rigid.{name}.energy"), energy, state.energy);
+    }
+    if !layout.contacts.is_empty() {
+        cell("energy_contact".into(), energy, row.energy_contact);
+        cell("dissipation_friction".into(), energy, row.dissipation_friction);
     }
     cell("ghost_faces".into(), "-", row.ghost_faces as f64);
     cell("populated_cells".into(), "-", row.populated_cells as f64);
@@ -219,6 +291,9 @@ mod tests {
             dimension: 3,
             whole: false,
             boundaries: vec!["a".into(), "b".into()],
+            rigids: vec!["cone".into()],
+            free: vec!["ball".into()],
+            contacts: vec!["cone-a".into()],
             conditioning: true,
         };
         let reaction = Reaction { force: [1.0, 2.0, 3.0], sum_abs: 4.0, torque: 5.0, held: 8.0 };
@@ -226,6 +301,9 @@ mod tests {
             step: 12,
             momentum: [0.0, 6.0, 0.0],
             reactions: vec![Reaction::default(), reaction],
+            rigids: vec![Reaction { torque: 9.0, ..reaction }],
+            contacts: vec![ContactState { area: 1.5, slip: 2.5, gap_max: 3.5 }],
+            energy_contact: 4.5,
             conditioning: Conditioning { cfl_ghost: 7.0, ..Default::default() },
             ..Default::default()
         };
@@ -237,6 +315,8 @@ mod tests {
         assert_eq!(value("reaction.b.z"), 3.0);
         assert_eq!(value("reaction.b.torque"), 5.0);
         assert_eq!(value("reaction.b.held"), 8.0);
+        assert_eq!((value("reaction.cone.y"), value("reaction.cone.torque")), (2.0, 9.0));
+        assert_eq!((value("contact.cone-a.slip"), value("energy_contact")), (2.5, 4.5));
         assert_eq!(value("cfl_ghost"), 7.0);
     }
 }

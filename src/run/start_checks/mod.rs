@@ -7,6 +7,7 @@
 //! | does something hold every rigid motion of every piece? | `support.rs`, `pieces.rs` |
 //! | does the problem fit into the machine? | `memory.rs`, `free_memory.rs` |
 
+pub mod contact;
 mod contest;
 pub mod formulas;
 pub mod free_memory;

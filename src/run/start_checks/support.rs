@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 
 use crate::basis;
+use crate::contact::start::corners_within;
 use crate::deck::model::{Load, Symmetry};
 use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
@@ -16,6 +17,7 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 use crate::system::numbering::Touched;
 use crate::system::populated::Populated;
+use crate::system::terms::contact::TOUCH;
 use crate::system::terms::surface;
 
 use super::pieces;
@@ -37,8 +39,10 @@ pub fn require<const D: usize>(
     match loose(world, model, points, active, first, None)? {
         None => Ok(()),
         Some((what, motion)) => Err(Error::Input(format!(
-            "{what} can {motion} freely: no boundary holds the nodes around it against this, so that \
-             the quasi-static system is singular; check the places and components of [[boundary]]"
+            "{what} can {motion} freely: no boundary holds the nodes around it against this{}, so \
+             that the quasi-static system is singular; check the places and components of \
+             [[boundary]]",
+            if model.contacts.is_empty() { "" } else { ", nor a rigid body that it touches" }
         ))),
     }
 }
@@ -52,6 +56,10 @@ pub fn falls<const D: usize>(
     first: StepSpan,
 ) -> Result<Option<String>> {
     let mut pulled = [false; D];
+    if !model.contacts.is_empty() {
+        // It falls onto something.
+        return Ok(None);
+    }
     for load in &model.deck.loads {
         if let Load::Gravity(gravity) = load {
             pulled
@@ -130,6 +138,16 @@ fn loose<const D: usize>(
         }
     }
     add_supports(model, points, numbering, &pieces, (middle, length), &mut grams)?;
+    for (piece, rows) in held_by_contact(model, points, numbering, &pieces, (&middle, length)) {
+        let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
+        for row in rows {
+            for (i, a) in row.iter().enumerate() {
+                for (j, b) in row.iter().enumerate() {
+                    gram[i * motions + j] += a * b;
+                }
+            }
+        }
+    }
     let free = of_all_ranks(world, model, grams)?.into_iter().find_map(|(piece, gram)| {
         if let Some(pulled) = pulled {
             let axis = (0..D).find(|&a| pulled[a] && gram[a * motions + a] == 0.0)?;
@@ -191,6 +209,42 @@ fn add_supports<const D: usize>(
         }
     }
     Ok(())
+}
+
+/// Rows of the rigid motions' values at the corners that touch a rigid surface, along its normal or,
+/// with friction, along all axes, each with its piece.
+fn held_by_contact<const D: usize>(
+    model: &Model<D>,
+    points: &Points<D>,
+    numbering: &Numbering,
+    pieces: &[u64],
+    (middle, length): (&[f64; D], f64),
+) -> Vec<(u64, Vec<Vec<f64>>)> {
+    let (contacts, basis) = (&model.contacts, model.deck.method.basis);
+    let touch = TOUCH * model.grid.cell_size();
+    let touching = corners_within(contacts, basis, points, touch).into_iter();
+    let held = touching.filter_map(|corner| {
+        let centre = &points.position[corner.point];
+        let near = model.grid.values_towards(&corner.place, centre, 0.0, None)?;
+        let nodes = near.nodes.iter().take(near.count);
+        let local = nodes.filter_map(|&node| numbering.local(node)).next()?;
+        let x: [f64; D] = std::array::from_fn(|a| (corner.place[a] - middle[a]) / length);
+        let along = |direction: &[f64; D]| -> Vec<f64> {
+            let rows = (0..D).map(|i| (direction[i], motions_at(&x, i)));
+            rows.fold(vec![0.0; D + D * (D - 1) / 2], |mut sum, (share, row)| {
+                sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += share * value);
+                sum
+            })
+        };
+        let law = &contacts.pairs[corner.pair].law;
+        let rows = if law.symmetric() {
+            vec![along(&corner.near.normal)]
+        } else {
+            (0..D).map(|i| motions_at(&x, i)).collect()
+        };
+        Some((pieces[local], rows))
+    });
+    held.collect()
 }
 
 /// Ghost faces that hold cells together which share no node: only among simplices.

@@ -9,11 +9,13 @@
 //! | tractions, pressures and supports on surfaces | `surface.rs` | formulations.md B.6 |
 //! | both of these as external forces that follow the motion | `following.rs` | |
 //! | their dense blocks | `block.rs` | |
+//! | rigid surfaces | `contact.rs` | formulations.md B.5 |
 //! | Ghost stiffness | `ghost.rs` | Ghost eq. 27, 28 |
 //! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
 //! | products of the last two | `scalar.rs` | |
 
 mod block;
+pub mod contact;
 pub mod following;
 pub mod ghost;
 pub mod inertia;

@@ -83,6 +83,12 @@ pub trait Term<const D: usize> {
         0.0
     }
 
+    /// Σ |f|^2 of forces that come from outside though they depend on the iterate, this rank's share,
+    /// N^2: they count among the actions that a residual is compared with.
+    fn squared_actions(&self, _at: At<'_>) -> f64 {
+        0.0
+    }
+
     /// Sizes of what [`Self::add_shares`] sums, at local nodes, N: the floor of round-off.
     fn add_share_sizes(&self, _at: At<'_>, _size: &mut [f64]) {}
 

@@ -1,0 +1,195 @@
+//! The rigid bodies of a deck, and which bodies touch them.
+
+use super::ball::Ball;
+use super::capsule::Capsule;
+use super::cone::Cone;
+use super::cuboid::Cuboid;
+use super::free::FreeBody;
+use super::half_space::HalfSpace;
+use super::law::{Friction, Law};
+use super::motion::{Motion, When};
+use super::outline::Outline;
+use super::pose::Pose;
+use super::surface::{Surface, length};
+use crate::deck::Deck;
+use crate::deck::model::{self, Basis, RigidShape, Symmetry};
+use crate::error::{Error, Result};
+
+/// A rigid body.
+#[derive(Debug)]
+pub struct Rigid<const D: usize> {
+    pub name: String,
+    pub surface: Box<dyn Surface<D>>,
+    pub motion: Motion,
+    /// As it begins, if it moves freely.
+    pub free: Option<FreeBody<D>>,
+}
+
+impl<const D: usize> Rigid<D> {
+    /// What its torque is about, m: the centre of mass, that of its rotation, or the origin.
+    pub fn torque_centre(&self, pose: &Pose<D>) -> [f64; D] {
+        if self.free.is_none() && self.motion.0.rotation.is_none() {
+            return [0.0; D];
+        }
+        std::array::from_fn(|a| pose.centre[a] + pose.shift[a])
+    }
+}
+
+/// A body on a rigid surface.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    pub name: String,
+    /// Index into [`Contacts::rigids`].
+    pub rigid: usize,
+    /// Index into the deck's bodies.
+    pub body: usize,
+    pub law: Law,
+}
+
+/// All of a deck.
+#[derive(Debug, Default)]
+pub struct Contacts<const D: usize> {
+    pub rigids: Vec<Rigid<D>>,
+    pub pairs: Vec<Pair>,
+    /// Points are sections of rings: axisymmetry.
+    pub rings: bool,
+}
+
+impl<const D: usize> Contacts<D> {
+    /// `stiffness`: mean stiffness of each body, Pa; `cell`: size of the grid's cells, m.
+    pub fn of_deck(deck: &Deck, stiffness: &[f64], cell: f64) -> Result<Self> {
+        let made = |(index, one)| rigid(deck, index, one);
+        let rigids = deck.rigids.iter().enumerate().map(made).collect::<Result<_>>()?;
+        let pair = |contact: &model::Contact| Pair {
+            name: contact.name.clone(),
+            rigid: contact.rigid,
+            body: contact.body,
+            law: Law {
+                penalty: contact.penalty * stiffness[contact.body] / cell,
+                friction: friction(contact),
+            },
+        };
+        let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
+        Ok(Contacts { rigids, pairs: deck.contacts.iter().map(pair).collect(), rings })
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.pairs.is_empty()
+    }
+
+    /// Whether the tangents of all equal their transposed.
+    pub fn symmetric(&self) -> bool {
+        self.pairs.iter().all(|pair| pair.law.symmetric())
+    }
+
+    /// Largest penalty on a body, Pa/m; 0 where it touches nothing.
+    pub fn stiffest(&self, body: usize) -> f64 {
+        let pairs = self.pairs.iter().filter(|pair| pair.body == body);
+        pairs.map(|pair| pair.law.penalty).fold(0.0, f64::max)
+    }
+
+    /// First word of a contact's elastic slip in the row of a point with so many corners.
+    pub fn slot_of(&self, pair: usize, corners: usize) -> usize {
+        let body = self.pairs[pair].body;
+        let earlier = &self.pairs[..pair];
+        let count = earlier.iter().filter(|p| p.body == body && p.law.has_history()).count();
+        count * corners * D
+    }
+
+    /// Names of the words of elastic slip that the points of each body carry.
+    pub fn slip_names(&self, deck: &Deck) -> Vec<Vec<String>> {
+        let corners = if deck.method.basis == Basis::Mpm { 1 } else { 1 << D };
+        let of_body = |body: usize| {
+            let pairs = self.pairs.iter().enumerate();
+            let slips = pairs.filter(|(_, pair)| pair.body == body && pair.law.has_history());
+            slips
+                .flat_map(|(pair, _)| {
+                    (0..corners * D).map(move |k| format!("{pair}.{}.{}", k / D, k % D))
+                })
+                .collect()
+        };
+        (0..deck.bodies.len()).map(of_body).collect()
+    }
+
+    /// Where the rigid bodies are.
+    pub fn poses(&self, when: When) -> Vec<Pose<D>> {
+        self.rigids.iter().map(|rigid| rigid.motion.pose(when)).collect()
+    }
+}
+
+fn friction(contact: &model::Contact) -> Friction {
+    let most = contact.max_shear.unwrap_or(f64::INFINITY);
+    match contact.friction {
+        model::Friction::Rough => match contact.max_shear {
+            None => Friction::Rough,
+            Some(most) => Friction::Coulomb { coefficient: 0.0, adhesion: most, most },
+        },
+        model::Friction::Coulomb(coefficient) => {
+            let adhesion = contact.adhesion;
+            if coefficient == 0.0 && adhesion == 0.0 {
+                return Friction::Smooth;
+            }
+            Friction::Coulomb { coefficient, adhesion, most }
+        }
+    }
+}
+
+fn rigid<const D: usize>(deck: &Deck, index: usize, rigid: &model::Rigid) -> Result<Rigid<D>> {
+    let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
+    let surface = surface(&rigid.shape, rings).ok_or_else(|| {
+        let why =
+            "the shape has no inside: its corners lie on a line, or two in a row in one place";
+        Error::Input(deck.places.say(&format!("rigid.{index}.shape"), why))
+    })?;
+    let free = match &rigid.free {
+        None => None,
+        Some(_) if rings => {
+            let why = "a body of revolution cannot move freely: leave the density out";
+            return Err(Error::Input(deck.places.say(&format!("rigid.{index}.density"), why)));
+        }
+        Some(free) => {
+            let solid = surface.solid().ok_or_else(|| {
+                let why = "a body of this shape has no known volume, and so no mass";
+                Error::Input(deck.places.say(&format!("rigid.{index}.density"), why))
+            })?;
+            Some(FreeBody::new(&solid, free))
+        }
+    };
+    let motion = Motion(rigid.motion.clone());
+    Ok(Rigid { name: rigid.name.clone(), surface, motion, free })
+}
+
+/// `None`: the shape is not of this dimension, or has no inside.
+fn surface<const D: usize>(shape: &RigidShape, rings: bool) -> Option<Box<dyn Surface<D>>> {
+    let place = |values: &[f64]| -> [f64; D] { std::array::from_fn(|a| values[a]) };
+    Some(match shape {
+        RigidShape::HalfSpace { point, normal } => {
+            let normal = place(normal);
+            let size = length(&normal);
+            Box::new(HalfSpace { point: place(point), normal: normal.map(|n| n / size) })
+        }
+        RigidShape::Ball { centre, radius } => {
+            Box::new(Ball { centre: place(centre), radius: *radius })
+        }
+        RigidShape::Box { min, max } => Box::new(Cuboid { min: place(min), max: place(max) }),
+        RigidShape::Capsule { from, to, radius } => {
+            Box::new(Capsule { from: place(from), to: place(to), radius: *radius })
+        }
+        RigidShape::Polygon { corners } if rings => of_dimension(Outline::mirrored(corners)?)?,
+        RigidShape::Polygon { corners } => of_dimension(Outline::new(corners)?)?,
+        RigidShape::Cone { tip, axis, angle, radius, shaft } => {
+            let size = length(axis);
+            let axis = axis.map(|a| a / size);
+            of_dimension(Cone::new(*tip, axis, *angle, *radius, *shaft)?)?
+        }
+    })
+}
+
+/// A surface of dimension `E` as one of dimension `D`; `None` where these differ.
+fn of_dimension<const D: usize, const E: usize>(
+    surface: impl Surface<E> + 'static,
+) -> Option<Box<dyn Surface<D>>> {
+    let boxed: Box<dyn Surface<E>> = Box::new(surface);
+    let any: Box<dyn std::any::Any> = Box::new(boxed);
+    any.downcast::<Box<dyn Surface<D>>>().ok().map(|surface| *surface)
+}

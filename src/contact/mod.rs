@@ -1,0 +1,47 @@
+//! Contact of bodies with rigid surfaces, by a penalty (formulations.md B.5; Bird et al. 2024,
+//! arXiv 2412.01565).
+//!
+//! | deck key | type | file |
+//! |---|---|---|
+//! | what a surface says of a place | [`Surface`], [`Near`] | `surface.rs` |
+//! | `half_space` | [`HalfSpace`](half_space::HalfSpace) | `half_space.rs` |
+//! | `disc`, `ball` | [`Ball`](ball::Ball) | `ball.rs` |
+//! | `box` | [`Cuboid`](cuboid::Cuboid) | `cuboid.rs` |
+//! | `capsule` | [`Capsule`](capsule::Capsule) | `capsule.rs` |
+//! | `polygon` | [`Outline`](outline::Outline) | `outline.rs` |
+//! | `cone` | [`Cone`](cone::Cone) | `cone.rs` |
+//! | where a rigid body is | [`Pose`](pose::Pose) | `pose.rs` |
+//! | how it is driven | [`Motion`](motion::Motion) | `motion.rs` |
+//! | volume and inertia | [`Solid`](solid::Solid) | `solid.rs` |
+//! | surfaces to be looked at | [`Facets`](facets::Facets) | `facets.rs` |
+//! | a rigid body that moves freely | [`FreeBody`](free::FreeBody) | `free.rs` |
+//! | pressure and friction | [`Law`](law::Law) | `law.rs` |
+//! | corners of the points' domains | [`DomainCorners`](corner::DomainCorners) | `corner.rs` |
+//! | corners at the start of a run | [`Corner`](start::Corner) | `start.rs` |
+//! | the rigid bodies and contacts of a deck | [`Contacts`] | `contacts.rs` |
+//!
+//! A new surface is one file that implements [`Surface`] and one line of `contacts.rs`. The forces
+//! and their tangent are a term of the equations: `system/terms/contact.rs`.
+
+pub mod ball;
+pub mod capsule;
+pub mod cone;
+pub mod contacts;
+pub mod corner;
+pub mod cuboid;
+pub mod facets;
+pub mod free;
+pub mod half_space;
+pub mod law;
+pub mod motion;
+pub mod outline;
+pub mod pose;
+pub mod solid;
+pub mod start;
+pub mod surface;
+
+pub use contacts::{Contacts, Pair, Rigid};
+pub use surface::{Near, Surface};
+
+#[cfg(test)]
+mod tests;

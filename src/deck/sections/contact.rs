@@ -1,0 +1,225 @@
+//! `[[rigid]]` and `[[contact]]`.
+
+use super::shapes;
+use crate::deck::model::{
+    Boundary, Contact, FreeRigid, Friction, Rigid, RigidMotion, RigidRotation, RigidShape,
+};
+use crate::deck::problems::Got;
+use crate::deck::reader::Table;
+use crate::deck::tree::Value;
+
+const FORMS: [&str; 7] = ["half_space", "disc", "ball", "box", "capsule", "polygon", "cone"];
+
+/// `boundaries`: as read, if that succeeded; their names are taken.
+pub fn rigids(
+    root: &Table<'_>,
+    dimension: usize,
+    boundaries: Option<&[Boundary]>,
+) -> Got<Vec<Rigid>> {
+    let mut names: Vec<String> =
+        boundaries.unwrap_or_default().iter().map(|boundary| boundary.name.clone()).collect();
+    root.tables("rigid", |_, table| {
+        let name = table.text("name")?;
+        if names.contains(&name) {
+            let message = format!("another boundary or rigid body is called \"{name}\"");
+            return Err(table.problem("name", message));
+        }
+        names.push(name.clone());
+        let shape = table.table("shape", |t| shape(&t, dimension));
+        let motion = table.table_if("motion", |t| motion(&t, dimension));
+        let (density, velocity) =
+            (table.number_if("density"), table.vector_if("velocity", dimension));
+        let (shape, motion, density, velocity) = (shape?, motion?, density?, velocity?);
+        if density.is_some() && motion.is_some() {
+            let message = "a rigid body is driven by motion or moves freely with its density";
+            return Err(table.problem("density", message));
+        }
+        if density.is_none() && velocity.is_some() {
+            let message = "has no effect without a density, with which the body moves freely";
+            let help = "a driven body has motion = { velocity = [...] }";
+            return Err(table.problem_with_help("velocity", message, help));
+        }
+        if density.is_some() && matches!(shape, RigidShape::HalfSpace { .. }) {
+            return Err(table.problem("density", "a half space has no end, and so no mass"));
+        }
+        let free = density.map(|density| FreeRigid {
+            density,
+            velocity: velocity.unwrap_or_else(|| vec![0.0; dimension]),
+        });
+        Ok(Rigid { name, shape, motion: motion.unwrap_or_default(), free })
+    })
+}
+
+fn shape(table: &Table<'_>, dimension: usize) -> Got<RigidShape> {
+    let form = table.one_of(&FORMS)?;
+    match form {
+        "polygon" if dimension != 2 => {
+            Err(table.problem("polygon", "polygons are 2D; the grid is 3D"))
+        }
+        "cone" if dimension != 3 => Err(table.problem_with_help(
+            "cone",
+            "cones are 3D; the grid is 2D",
+            "use polygon = [[x, y], ...] with the corners of its profile",
+        )),
+        "polygon" => {
+            let corners = table.points("polygon", 2)?;
+            let corners: Vec<[f64; 2]> = corners.iter().map(|x| [x[0], x[1]]).collect();
+            if corners.len() < 3 {
+                let message = format!("expected 3 or more corners, found {}", corners.len());
+                return Err(table.problem("polygon", message));
+            }
+            Ok(RigidShape::Polygon { corners })
+        }
+        _ => table.table(form, |t| match form {
+            "half_space" => {
+                let (point, normal) =
+                    (t.vector("point", dimension), direction(&t, "normal", dimension));
+                Ok(RigidShape::HalfSpace { point: point?, normal: normal? })
+            }
+            "box" => {
+                let (min, max) = shapes::corners(&t, dimension, false)?;
+                Ok(RigidShape::Box { min, max })
+            }
+            "capsule" => {
+                let (from, to) = (t.vector("from", dimension), t.vector("to", dimension));
+                let radius = t.number("radius");
+                Ok(RigidShape::Capsule { from: from?, to: to?, radius: radius? })
+            }
+            "cone" => {
+                let tip = t.vector("tip", 3);
+                let axis = if t.given("axis") {
+                    direction(&t, "axis", 3)
+                } else {
+                    Ok(vec![0.0, 0.0, 1.0])
+                };
+                let (angle, radius) = (t.number("angle"), t.number("radius"));
+                let (shaft, tip, axis) = (t.number("shaft")?, tip?, axis?);
+                let triple = |v: Vec<f64>| [v[0], v[1], v[2]];
+                let (tip, axis) = (triple(tip), triple(axis));
+                Ok(RigidShape::Cone { tip, axis, angle: angle?, radius: radius?, shaft })
+            }
+            _ => {
+                let (centre, radius) = (t.vector("centre", dimension), t.number("radius"));
+                Ok(RigidShape::Ball { centre: centre?, radius: radius? })
+            }
+        }),
+    }
+}
+
+/// A vector that is not zero.
+fn direction(table: &Table<'_>, name: &str, dimension: usize) -> Got<Vec<f64>> {
+    let vector = table.vector(name, dimension)?;
+    if vector.iter().all(|v| *v == 0.0) {
+        return Err(table.problem(name, "expected a direction, found zeros"));
+    }
+    Ok(vector)
+}
+
+fn motion(table: &Table<'_>, dimension: usize) -> Got<RigidMotion> {
+    let displacement = table.expressions_if("displacement", dimension);
+    let velocity = table.expressions_if("velocity", dimension);
+    let rotation = table.table_if("rotation", |t| {
+        let (centre, degrees) = (t.vector_if("centre", dimension), t.expression_if("degrees")?);
+        if dimension == 2 {
+            t.refuse(&["axis"], "only in 3D")?;
+        }
+        let axis = if t.given("axis") { direction(&t, "axis", 3)? } else { vec![0.0, 0.0, 1.0] };
+        let centre = centre?.unwrap_or_else(|| vec![0.0; dimension]);
+        let degrees = degrees.ok_or_else(|| t.missing("degrees", ""))?;
+        Ok(RigidRotation { centre, axis: [axis[0], axis[1], axis[2]], degrees })
+    });
+    Ok(RigidMotion {
+        displacement: displacement?.unwrap_or_default(),
+        velocity: velocity?.unwrap_or_default(),
+        rotation: rotation?,
+    })
+}
+
+/// `rigids`: as read, if that succeeded; `bodies`: names as written.
+pub fn contacts(
+    root: &Table<'_>,
+    rigids: Option<&[Rigid]>,
+    bodies: &[String],
+) -> Got<Vec<Contact>> {
+    let mut names: Vec<String> = Vec::new();
+    root.tables("contact", |_, table| {
+        let pair = between(&table, rigids, bodies);
+        let friction = friction(&table);
+        let (adhesion, most) = (table.number("adhesion"), table.number_if("max_shear"));
+        let penalty = table.number("penalty");
+        let (rigid, body, joined) = pair?;
+        let name = table.text_if("name")?.unwrap_or(joined);
+        if names.contains(&name) {
+            return Err(table.problem("name", format!("another contact is called \"{name}\"")));
+        }
+        names.push(name.clone());
+        let (friction, adhesion, max_shear) = (friction?, adhesion?, most?);
+        if friction == Friction::Rough && adhesion > 0.0 {
+            let message = "has no effect with friction = \"rough\", which lets nothing slip";
+            return Err(table.problem("adhesion", message));
+        }
+        if friction == Friction::Coulomb(0.0) && adhesion == 0.0 && max_shear.is_some() {
+            let message = "has no effect on a smooth surface: friction and adhesion are zero";
+            return Err(table.problem("max_shear", message));
+        }
+        Ok(Contact { name, rigid, body, friction, adhesion, max_shear, penalty: penalty? })
+    })
+}
+
+/// Indices of the rigid body and the body, and both names in one.
+fn between(
+    table: &Table<'_>,
+    rigids: Option<&[Rigid]>,
+    bodies: &[String],
+) -> Got<(usize, usize, String)> {
+    let Some(node) = table.node("between") else { return Err(table.missing("between", "")) };
+    let names = match &node.value {
+        Value::Array(items) => items
+            .iter()
+            .map(|item| match &item.value {
+                Value::String(name) => Some(name.as_str()),
+                _ => None,
+            })
+            .collect::<Option<Vec<&str>>>(),
+        _ => None,
+    };
+    let Some([first, second]) = names.as_deref() else { return Err(table.wrong("between", node)) };
+    let rigid_names: Vec<&str> = match rigids {
+        Some(rigids) => rigids.iter().map(|rigid| rigid.name.as_str()).collect(),
+        // Their own faults have been told.
+        None => vec![first, second],
+    };
+    let rigid = |name: &str| rigid_names.iter().position(|known| *known == name);
+    let body = |name: &str| bodies.iter().position(|known| known == name);
+    for name in [first, second] {
+        if rigid(name).is_none() && body(name).is_none() {
+            let known: Vec<&str> =
+                rigid_names.iter().copied().chain(bodies.iter().map(String::as_str)).collect();
+            return Err(table.unknown_word("between", name, &known, &node.origin));
+        }
+    }
+    match (rigid(first), body(second), rigid(second), body(first)) {
+        (Some(r), Some(b), ..) | (_, _, Some(r), Some(b)) => Ok((r, b, format!("{first}-{second}"))),
+        (Some(_), _, Some(_), _) => Err(table.problem(
+            "between",
+            format!("\"{first}\" and \"{second}\" are both rigid: only a body yields"),
+        )),
+        _ => Err(table.problem_with_help(
+            "between",
+            format!(
+                "\"{first}\" and \"{second}\" are both bodies: they meet on the grid, which lets them \
+                 not slip, and no other contact of two bodies is known"
+            ),
+            "describe one of them as a [[rigid]] body, or leave this contact out",
+        )),
+    }
+}
+
+fn friction(table: &Table<'_>) -> Got<Friction> {
+    let Some(node) = table.node("friction") else { return Ok(Friction::Coulomb(0.0)) };
+    match (&node.value, node.number()) {
+        (Value::String(word), _) if word == "rough" => Ok(Friction::Rough),
+        (_, Some(value)) if value.is_finite() && value >= 0.0 => Ok(Friction::Coulomb(value)),
+        _ => Err(table.wrong("friction", node)),
+    }
+}

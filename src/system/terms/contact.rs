@@ -1,0 +1,575 @@
+//! f_I = Σ_c A N_I(X_c) (p n - t): what rigid surfaces exert on the corners of the points' domains
+//! (formulations.md B.5; the law: [`crate::contact::law`]), with the tangent of an iterate.
+//!
+//! A corner moves as the grid's own functions at its place say, x = X_c + Σ N_I(X_c) u_I. It lies in a
+//! cell that its point populates, or beside it, where that cell's functions go on: its nodes are among
+//! the point's, and the sparsity of the equations holds its blocks. A corner beyond the grid moves with
+//! its point.
+
+use std::ops::Range;
+use std::sync::Arc;
+
+use crate::contact::corner::DomainCorners;
+use crate::contact::free::FreeBody;
+use crate::contact::law::{Friction, Law, Reached, Response};
+use crate::contact::motion::When;
+use crate::contact::pose::Pose;
+use crate::contact::surface::length;
+use crate::contact::{Contacts, Near, Pair};
+use crate::deck::model::Basis;
+use crate::grid::Grid;
+use crate::grid::bins::REACH;
+use crate::points::{Points, Snapshot};
+use crate::system::conditions::StepSpan;
+use crate::system::in_place::InPlace;
+use crate::system::model::Model;
+use crate::system::pattern::Pattern;
+use crate::system::scatter::BlockRows;
+use crate::system::step_system::Discretisation;
+use crate::tensor::Square;
+use crate::tensor::dense::dot;
+
+use super::term::{At, Health, Part, Term};
+
+/// Cells within which a corner may come to a surface in a step.
+const MARGIN: f64 = 2.0;
+/// Cells from a surface within which a corner counts as touching it: what rests on a surface without
+/// a load is held by it.
+pub const TOUCH: f64 = 1e-9;
+
+/// A corner near a rigid surface.
+struct Candidate<const D: usize> {
+    pair: usize,
+    point: usize,
+    /// First word of its elastic slip in the row of its point.
+    slot: usize,
+    /// X_c, m.
+    place: [f64; D],
+    /// m2 (m in 2D)
+    area: f64,
+    /// Gap at the step's start, m.
+    gap: f64,
+    /// What acts at the step's start, with the gap; `None` where it does not touch.
+    first: Option<(f64, Response<D>)>,
+    /// Elastic slip at the step's start, in the rigid body's frame, m.
+    elastic: [f64; D],
+    /// Its entries of `nodes` and `weights`.
+    entries: Range<usize>,
+}
+
+/// The corners near rigid surfaces in one step.
+pub struct ContactTerm<const D: usize> {
+    contacts: Arc<Contacts<D>>,
+    /// m
+    cell: f64,
+    /// Of the rigid bodies at the step's start and at its end.
+    poses: [Vec<Pose<D>>; 2],
+    /// Those that reach nodes of other ranks come first.
+    candidates: Vec<Candidate<D>>,
+    reaching: usize,
+    /// Local nodes.
+    nodes: Vec<u32>,
+    weights: Vec<f64>,
+}
+
+impl<const D: usize> ContactTerm<D> {
+    /// `None` where the deck has no contact. `free`: the rigid bodies that move freely, at the step's
+    /// start; empty for none.
+    pub fn new(
+        model: &Model<D>,
+        mesh: &Discretisation<D>,
+        points: &Points<D>,
+        span: StepSpan,
+        free: &[Option<FreeBody<D>>],
+    ) -> Option<Self> {
+        let contacts = &model.contacts;
+        if contacts.is_empty() {
+            return None;
+        }
+        let start = When { load_factor: span.factor_start, time: span.time_start };
+        let end = When { load_factor: span.factor_end, time: span.time_end };
+        let mut term = ContactTerm {
+            contacts: Arc::clone(contacts),
+            cell: model.grid.cell_size(),
+            poses: [contacts.poses(start), contacts.poses(end)],
+            candidates: Vec::new(),
+            reaching: 0,
+            nodes: Vec::new(),
+            weights: Vec::new(),
+        };
+        for (rigid, body) in free.iter().enumerate() {
+            let Some(body) = body else { continue };
+            let mut on = body.clone();
+            on.advance(&[0.0; D], &[0.0; 3], &[0.0; D], span.time_end - span.time_start);
+            (term.poses[0][rigid], term.poses[1][rigid]) = (body.pose, on.pose);
+        }
+        for (pair, of) in contacts.pairs.iter().enumerate() {
+            for p in (0..points.len()).filter(|&p| points.body[p] as usize == of.body) {
+                if term.may_touch(of, &points.position[p], &points.half_length[p]) {
+                    term.add_corners(model, mesh, points, (pair, of), p);
+                }
+            }
+        }
+        let owned = mesh.numbering.owned;
+        let nodes = &term.nodes;
+        let reaches = |candidate: &Candidate<D>| {
+            nodes[candidate.entries.clone()].iter().any(|&node| node as usize >= owned)
+        };
+        term.candidates.sort_by_key(|candidate| !reaches(candidate));
+        term.reaching = term.candidates.iter().take_while(|c| reaches(c)).count();
+        Some(term)
+    }
+
+    /// Whether the domain of a point may come to the surface in the step.
+    fn may_touch(&self, pair: &Pair, x: &[f64; D], half: &[f64; D]) -> bool {
+        let surface = &self.contacts.rigids[pair.rigid].surface;
+        let (low, high) = surface.bounds();
+        // A domain that turns or shears reaches further than its half lengths.
+        let reach = 2.0 * half.iter().sum::<f64>() + MARGIN * self.cell;
+        self.poses.iter().any(|poses| {
+            let place = poses[pair.rigid].to_body(x);
+            let inside = |a: usize| place[a] >= low[a] - reach && place[a] <= high[a] + reach;
+            (0..D).all(inside) && surface.near(&place).gap <= reach
+        })
+    }
+
+    fn add_corners(
+        &mut self,
+        model: &Model<D>,
+        mesh: &Discretisation<D>,
+        points: &Points<D>,
+        (pair, of): (usize, &Pair),
+        p: usize,
+    ) {
+        let basis = model.deck.method.basis;
+        let corners = DomainCorners::of(basis, self.contacts.rings, points, p);
+        let first = self.contacts.slot_of(pair, corners.count);
+        let contacts = Arc::clone(&self.contacts);
+        let surface = &*contacts.rigids[of.rigid].surface;
+        for (corner, place) in corners.positions.iter().take(corners.count).enumerate() {
+            let near = self.poses[0][of.rigid].near(surface, place);
+            let entries = self.interpolate(&model.grid, basis, mesh, points, p, place);
+            let slot = first + corner * D;
+            let pose = &self.poses[0][of.rigid];
+            let mut slip = [0.0; D];
+            if of.law.has_history() {
+                let row = points.slip.of(p, points.body[p]);
+                slip = std::array::from_fn(|i| row[slot + i]);
+            }
+            // The slip that the step before has left, within what the pressure now allows.
+            let reached = Reached { near, gap_before: 0.0, slip: pose.vector_to_space(&slip) };
+            let first = self.touches(&near).then(|| (near.gap, of.law.respond(&reached)));
+            let elastic = first
+                .as_ref()
+                .map_or([0.0; D], |(_, first)| pose.vector_to_body(&first.elastic_slip));
+            self.candidates.push(Candidate {
+                pair,
+                point: p,
+                slot,
+                place: *place,
+                area: corners.area(corner, &near.normal),
+                gap: near.gap,
+                first,
+                elastic,
+                entries,
+            });
+        }
+    }
+
+    /// Nodes that move a corner, and their weights.
+    fn interpolate(
+        &mut self,
+        grid: &Grid<D>,
+        basis: Basis,
+        mesh: &Discretisation<D>,
+        points: &Points<D>,
+        p: usize,
+        place: &[f64; D],
+    ) -> Range<usize> {
+        let start = self.nodes.len();
+        let x = &points.position[p];
+        let values = match basis {
+            Basis::Mpm => None,
+            Basis::Gimp => {
+                // A tilted corner may leave the cells of its point: their functions go on beyond them.
+                let half = &points.half_length[p];
+                let held: [f64; D] =
+                    std::array::from_fn(|a| place[a].clamp(x[a] - half[a], x[a] + half[a]));
+                let cell = grid.values_towards(&held, x, REACH, None).map(|values| values.cell);
+                cell.and_then(|cell| grid.interpolate_in(cell, place)).map(|at| at.values)
+            }
+            _ => grid.values_towards(place, x, REACH, None),
+        };
+        let group = mesh.groups.group_of_point[p];
+        let nodes = mesh.groups.node_offsets[group]..mesh.groups.node_offsets[group + 1];
+        let nodes = &mesh.group_nodes[nodes];
+        if let Some(values) = values {
+            for (&node, &weight) in values.nodes.iter().zip(&values.weights).take(values.count) {
+                // A node that is none of the point's has no weight but for round-off.
+                if let Some(local) = mesh.numbering.local(node).map(|local| local as u32)
+                    && nodes.contains(&local)
+                {
+                    self.nodes.push(local);
+                    self.weights.push(weight);
+                }
+            }
+        } else {
+            self.nodes.extend_from_slice(nodes);
+            self.weights.extend_from_slice(&mesh.influences.weights[mesh.influences.row(p)]);
+        }
+        start..self.nodes.len()
+    }
+
+    /// Weights of a corner with their local nodes.
+    fn entries(&self, of: &Candidate<D>) -> impl Iterator<Item = (usize, f64)> {
+        let nodes = self.nodes[of.entries.clone()].iter().map(|&node| node as usize);
+        nodes.zip(self.weights[of.entries.clone()].iter().copied())
+    }
+
+    /// x, m, for the nodal increments.
+    fn position(&self, of: &Candidate<D>, displacement: &[f64]) -> [f64; D] {
+        let mut x = of.place;
+        for (node, weight) in self.entries(of) {
+            for (x, u) in x.iter_mut().zip(&displacement[node * D..]) {
+                *x += weight * u;
+            }
+        }
+        x
+    }
+
+    fn law(&self, of: &Candidate<D>) -> Law {
+        self.contacts.pairs[of.pair].law
+    }
+
+    fn touches(&self, near: &Near<D>) -> bool {
+        near.gap <= TOUCH * self.cell
+    }
+
+    /// Elastic slip of the start and the motion against the surface in the step, in the rigid body's
+    /// frame at the end, m.
+    fn slip(&self, of: &Candidate<D>, x: &[f64; D]) -> [f64; D] {
+        let rigid = self.contacts.pairs[of.pair].rigid;
+        let from = self.poses[0][rigid].to_body(&of.place);
+        let to = self.poses[1][rigid].to_body(x);
+        std::array::from_fn(|i| of.elastic[i] + to[i] - from[i])
+    }
+
+    /// What acts on a corner at `x` at the step's end, and the gap there; `None` where it does not
+    /// touch.
+    fn respond(&self, of: &Candidate<D>, x: &[f64; D]) -> Option<(f64, Response<D>)> {
+        let rigid = self.contacts.pairs[of.pair].rigid;
+        let pose = &self.poses[1][rigid];
+        let near = pose.near(&*self.contacts.rigids[rigid].surface, x);
+        if !self.touches(&near) {
+            return None;
+        }
+        let law = self.law(of);
+        let slip = if law.has_history() { self.slip(of, x) } else { [0.0; D] };
+        let reached = Reached { near, gap_before: of.gap, slip: pose.vector_to_space(&slip) };
+        Some((near.gap, law.respond(&reached)))
+    }
+
+    /// Adds this rank's shares of the force at the step's start at its local nodes, N.
+    pub fn add_force_at_start(&self, force: &mut [f64]) {
+        for of in &self.candidates {
+            if let Some((_, response)) = &of.first {
+                self.add_force_of(of, response, 1.0, force);
+            }
+        }
+    }
+
+    /// Adds `share` times the force on a corner.
+    fn add_force_of(
+        &self,
+        of: &Candidate<D>,
+        response: &Response<D>,
+        share: f64,
+        force: &mut [f64],
+    ) {
+        for (node, weight) in self.entries(of) {
+            for (f, t) in force[node * D..].iter_mut().zip(&response.traction) {
+                *f += share * weight * of.area * t;
+            }
+        }
+    }
+
+    fn of_part(&self, part: Part) -> &[Candidate<D>] {
+        match part {
+            Part::Reaching => &self.candidates[..self.reaching],
+            Part::Inner => &self.candidates[self.reaching..],
+        }
+    }
+
+    /// Adds N_a N_b `stiffness` A to the rows of a corner's nodes.
+    fn add_block(
+        &self,
+        of: &Candidate<D>,
+        stiffness: &Square<D>,
+        pattern: &Pattern,
+        rows: &mut InPlace<'_, D>,
+    ) {
+        for (node, of_a) in self.entries(of) {
+            let row = pattern.row_of[node] as usize;
+            rows.touch(pattern, row);
+            let columns = &pattern.columns[pattern.offsets[row]..pattern.offsets[row + 1]];
+            let (width, start) = (D * columns.len(), rows.start(pattern, row));
+            for (other, of_b) in self.entries(of) {
+                let Some(at) = columns.iter().position(|&column| column as usize == other) else {
+                    continue;
+                };
+                let factor = of.area * of_a * of_b;
+                for (i, line) in stiffness.iter().enumerate() {
+                    let target = rows.values(start + i * width + at * D, D);
+                    for (value, k) in target.iter_mut().zip(line) {
+                        *value += factor * k;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Where the nodal increments bring a rigid surface more than a cell deep into a body of this rank.
+    pub fn too_deep(&self, points: &Points<D>, displacement: &[f64]) -> Option<String> {
+        let mut found = (self.cell, None);
+        for of in &self.candidates {
+            let x = self.position(of, displacement);
+            if let Some((gap, _)) = self.respond(of, &x)
+                && -gap > found.0
+            {
+                found = (-gap, Some((of, x)));
+            }
+        }
+        let (depth, at) = found;
+        at.map(|(of, x)| {
+            let pair = &self.contacts.pairs[of.pair];
+            format!(
+                "contact \"{}\" would be {depth:.2e} m deep at {x:?} (point {}), more than a cell",
+                pair.name, points.id[of.point]
+            )
+        })
+    }
+
+    /// What the rigid bodies exert at the step's start, this rank's share.
+    pub fn exerted_at_start(&self) -> Vec<Exerted> {
+        let mut all = vec![Exerted::default(); self.contacts.rigids.len()];
+        for of in &self.candidates {
+            if let Some((_, response)) = &of.first {
+                let rigid = self.contacts.pairs[of.pair].rigid;
+                let force = response.traction.map(|t| of.area * t);
+                let pose = &self.poses[0][rigid];
+                let centre = self.contacts.rigids[rigid].torque_centre(pose);
+                all[rigid].add(&force, &of.place, &centre);
+            }
+        }
+        all
+    }
+
+    /// Where a rigid body is at the step's end.
+    pub fn set_end(&mut self, rigid: usize, pose: Pose<D>) {
+        self.poses[1][rigid] = pose;
+    }
+
+    /// What an implicit step leaves: the state at its end, and the forces and the work of the step.
+    /// `shares` of the forces at both ends in those that acted over the step; positions are those of
+    /// the nodal increments `displacement`.
+    pub fn finish(&self, displacement: &[f64], shares: [f64; 2]) -> Finished<D> {
+        let mut done = Finished::new(&self.contacts);
+        for of in &self.candidates {
+            let x = self.position(of, displacement);
+            let last = self.respond(of, &x);
+            let of_state = |state: &Option<(f64, Response<D>)>| {
+                state.as_ref().map_or([0.0; D], |(_, response)| response.traction)
+            };
+            let ends = [of_state(&of.first), of_state(&last)];
+            let mean = |shares: [f64; 2]| {
+                std::array::from_fn(|i| of.area * (shares[0] * ends[0][i] + shares[1] * ends[1][i]))
+            };
+            let rigid = self.contacts.pairs[of.pair].rigid;
+            done.work += dot(&mean([0.5; 2]), &self.carried(of, &x));
+            let centre = self.contacts.rigids[rigid].torque_centre(&self.poses[1][rigid]);
+            done.rigids[rigid].add(&mean(shares), &x, &centre);
+            let mut slip = [0.0; D];
+            if let Some((gap, response)) = &last {
+                done.add_state(of, self.law(of), *gap, response);
+                // All of it: the pressure that the next step begins with may allow more.
+                let whole = std::array::from_fn(|i| response.elastic_slip[i] + response.sliding[i]);
+                slip = self.poses[1][rigid].vector_to_body(&whole);
+            }
+            done.keep(of, self.law(of), slip);
+        }
+        done
+    }
+
+    /// What an explicit step leaves, in which the forces of its start act.
+    pub fn finish_explicit(&self, displacement: &[f64]) -> Finished<D> {
+        let mut done = Finished::new(&self.contacts);
+        done.rigids = self.exerted_at_start();
+        for of in &self.candidates {
+            let (x, law) = (self.position(of, displacement), self.law(of));
+            let mut slip = [0.0; D];
+            if let Some((gap, response)) = &of.first {
+                let force = response.traction.map(|t| of.area * t);
+                done.work += dot(&force, &self.carried(of, &x));
+                done.add_state(of, law, *gap, response);
+                slip = self.slip(of, &x);
+            } else if matches!(law.friction, Friction::Coulomb { .. }) {
+                // The way so far tells the direction of friction if it touches in the next step.
+                slip = self.slip(of, &x);
+            }
+            done.keep(of, law, slip);
+        }
+        done
+    }
+
+    /// The way of the surface below a corner that comes to `x`, m.
+    fn carried(&self, of: &Candidate<D>, x: &[f64; D]) -> [f64; D] {
+        let rigid = self.contacts.pairs[of.pair].rigid;
+        let from = self.poses[0][rigid].to_space(&self.poses[1][rigid].to_body(x));
+        std::array::from_fn(|i| x[i] - from[i])
+    }
+}
+
+impl<const D: usize> Term<D> for &ContactTerm<D> {
+    fn symmetric(&self) -> bool {
+        self.contacts.symmetric()
+    }
+
+    fn add_shares(
+        &self,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        mut rows: Option<&mut InPlace<'_, D>>,
+    ) -> Health {
+        for of in self.of_part(part) {
+            let x = self.position(of, at.displacement);
+            let Some((_, response)) = self.respond(of, &x) else { continue };
+            self.add_force_of(of, &response, -1.0, force);
+            if let Some(rows) = rows.as_deref_mut() {
+                self.add_block(of, &response.stiffness, at.pattern, rows);
+            }
+        }
+        Health::default()
+    }
+
+    fn squared_actions(&self, at: At<'_>) -> f64 {
+        let squared = |of: &Candidate<D>| {
+            let x = self.position(of, at.displacement);
+            let response = self.respond(of, &x);
+            let traction = response.map_or([0.0; D], |(_, response)| response.traction);
+            traction.iter().map(|t| (of.area * t) * (of.area * t)).sum::<f64>()
+        };
+        self.candidates.iter().map(squared).sum()
+    }
+
+    /// A gap carries the round-off of the place.
+    fn add_share_sizes(&self, at: At<'_>, size: &mut [f64]) {
+        for of in &self.candidates {
+            let x = self.position(of, at.displacement);
+            let distance = x.iter().map(|x| x * x).sum::<f64>().sqrt();
+            let force = self.law(of).penalty * of.area * distance;
+            for (node, weight) in self.entries(of) {
+                size[node] += weight.abs() * force;
+            }
+        }
+    }
+}
+
+/// What a rigid body exerts, this rank's share.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Exerted {
+    /// N
+    pub force: [f64; 3],
+    /// Sum of the sizes of the forces on the corners, N.
+    pub sum_abs: f64,
+    /// About [`Rigid::torque_centre`](crate::contact::Rigid::torque_centre), N m; in 2D along z.
+    pub torque: [f64; 3],
+}
+
+impl Exerted {
+    fn add<const D: usize>(&mut self, force: &[f64; D], x: &[f64; D], centre: &[f64; D]) {
+        for (sum, f) in self.force.iter_mut().zip(force) {
+            *sum += f;
+        }
+        self.sum_abs += force.iter().map(|f| f * f).sum::<f64>().sqrt();
+        let (mut arm, mut f) = ([0.0; 3], [0.0; 3]);
+        for a in 0..D {
+            (arm[a], f[a]) = (x[a] - centre[a], force[a]);
+        }
+        for (k, torque) in self.torque.iter_mut().enumerate() {
+            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
+            *torque += arm[i] * f[j] - arm[j] * f[i];
+        }
+    }
+}
+
+/// A contact at the end of a step, this rank's share.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Touching {
+    /// m2 (m in 2D)
+    pub area: f64,
+    /// Σ A times the slip of the step, m3 (m2 in 2D).
+    pub slid: f64,
+    /// Of the deepest corner, m.
+    pub depth: f64,
+}
+
+/// What a step of contact leaves, this rank's share.
+#[derive(Debug)]
+pub struct Finished<const D: usize> {
+    pub rigids: Vec<Exerted>,
+    pub pairs: Vec<Touching>,
+    /// In penalties, J.
+    pub energy: f64,
+    /// Of friction in the step, J.
+    pub dissipation: f64,
+    /// Of the rigid bodies on the others in the step, J.
+    pub work: f64,
+    /// Point, first word, elastic slip in the rigid body's frame.
+    slips: Vec<(usize, usize, [f64; D])>,
+}
+
+impl<const D: usize> Finished<D> {
+    fn new(contacts: &Contacts<D>) -> Self {
+        Finished {
+            rigids: vec![Exerted::default(); contacts.rigids.len()],
+            pairs: vec![Touching::default(); contacts.pairs.len()],
+            energy: 0.0,
+            dissipation: 0.0,
+            work: 0.0,
+            slips: Vec::new(),
+        }
+    }
+
+    /// Adds what a corner that touches holds and loses.
+    fn add_state(&mut self, of: &Candidate<D>, law: Law, gap: f64, response: &Response<D>) {
+        let slid = length(&response.sliding);
+        let held = length(&response.elastic_slip);
+        let state = &mut self.pairs[of.pair];
+        state.area += of.area;
+        state.slid += of.area * slid;
+        state.depth = state.depth.max(-gap);
+        self.energy += 0.5 * law.penalty * of.area * (gap * gap + held * held);
+        self.dissipation += law.penalty * of.area * held * slid;
+    }
+
+    fn keep(&mut self, of: &Candidate<D>, law: Law, slip: [f64; D]) {
+        if law.has_history() {
+            self.slips.push((of.point, of.slot, slip));
+        }
+    }
+
+    /// Gives the points the elastic slip of the step's end; what it overwrites is kept in `before`.
+    pub fn keep_slip(&self, points: &mut Points<D>, before: Option<&mut Snapshot<D>>) {
+        if points.slip.stride() == 0 {
+            return;
+        }
+        if let Some(before) = before {
+            before.slip.copy(&points.slip.values);
+        }
+        for (p, slot, slip) in &self.slips {
+            let body = points.body[*p];
+            points.slip.of_mut(*p, body)[*slot..*slot + D].copy_from_slice(slip);
+        }
+    }
+}
