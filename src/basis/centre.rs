@@ -7,28 +7,19 @@
 //! of all cells that the domain overlaps, each weighted by its share of the domain. Both reproduce
 //! the gradient of linear fields exactly, so that a uniform deformation stays what it is.
 
-use super::{Influences, gimp};
-use crate::deck::model::{Basis, GimpEdge};
+use super::Influences;
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
-use crate::points::Points;
 
-/// One gradient for each entry of `influences`, 1/m. Error: a basis without cells of its own, or a
-/// cell of a mesh without volume.
-pub fn gradients<const D: usize>(
+/// One gradient for each entry of rows that are those of a cell, 1/m. Error: a cell of a mesh
+/// without volume.
+pub(super) fn of_cells<const D: usize>(
     grid: &Grid<D>,
-    basis: Basis,
-    edge: GimpEdge,
-    points: &Points<D>,
     influences: &Influences<D>,
 ) -> Result<Vec<[f64; D]>> {
-    match (basis, grid) {
-        (Basis::Gimp, _) => gimp::centre_gradients(grid, edge, points),
-        (Basis::Mpm, Grid::Lattice(lattice)) => Ok(on_lattice(lattice, influences)),
-        (Basis::Mpm, Grid::Mesh(_)) => on_mesh(grid, influences),
-        (Basis::Cpdi1 | Basis::Cpdi2, _) => Err(Error::Input(
-            "method.locking = \"f-bar\" is for basis = \"mpm\" and basis = \"gimp\"".to_string(),
-        )),
+    match grid {
+        Grid::Lattice(lattice) => Ok(on_lattice(lattice, influences)),
+        Grid::Mesh(_) => on_mesh(grid, influences),
     }
 }
 

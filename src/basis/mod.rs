@@ -6,6 +6,7 @@
 //! | `gimp` | `gimp.rs` | Ghost §2.5, after Bardenhagen and Kober |
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
+//! | (all) | `contract.rs` | `trait Basis`: what each of them owes |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
 //! | `locking` | `centre.rs` | gradients at the centres of cells, for F-bar |
@@ -14,6 +15,7 @@
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
 pub mod centre;
+pub mod contract;
 pub mod domain;
 pub mod gimp;
 pub mod groups;
@@ -171,17 +173,7 @@ pub fn map_points_with<const D: usize>(
     edge: GimpEdge,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
-    let mut hint = None;
-    match basis {
-        Basis::Mpm => mpm::map_points(grid, points),
-        Basis::Gimp => gimp::map_points(grid, edge, points),
-        Basis::Cpdi1 => row::map_points(points, |p, row| {
-            cpdi1::corners(points, p)?.fill(grid, points, p, &mut hint, row)
-        }),
-        Basis::Cpdi2 => row::map_points(points, |p, row| {
-            cpdi2::corners(points, p)?.fill(grid, points, p, &mut hint, row)
-        }),
-    }
+    contract::of_deck(basis, edge).map_points(grid, points)
 }
 
 /// Appends the cells populated by point `p`: strictly overlapped by its domain, or holding it.
@@ -196,15 +188,7 @@ pub fn populated_cells<const D: usize>(
     hint: Option<usize>,
     out: &mut Vec<usize>,
 ) -> Result<()> {
-    match basis {
-        Basis::Mpm => mpm::populated_cells(grid, points, p, hint, out),
-        Basis::Gimp => gimp::populated_cells(grid, points, p, out),
-        Basis::Cpdi1 => {
-            let corners = cpdi1::corner_positions(points, p);
-            corner::populated_cells(grid, points, p, &corners, hint, out)
-        }
-        Basis::Cpdi2 => corner::populated_cells(grid, points, p, &points.corners[p], hint, out),
-    }
+    contract::of_deck(basis, GimpEdge::Continued).populated_cells(grid, points, p, hint, out)
 }
 
 /// The lattice that `gimp` needs under its axis-aligned domains.

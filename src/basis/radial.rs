@@ -18,9 +18,9 @@
 //! its update is off, ends at the axis.
 
 use super::gimp::{self, spans};
+use super::contract::Basis;
 use super::product::{Line, for_each_index};
 use super::{Influences, lattice_of, outside};
-use crate::deck::model::Basis;
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
@@ -30,7 +30,7 @@ use crate::points::Points;
 /// off the axis, by id and place.
 pub fn turn<const D: usize>(
     grid: &Grid<D>,
-    basis: Basis,
+    basis: &dyn Basis<D>,
     points: &Points<D>,
     influences: &mut Influences<D>,
 ) -> Result<()> {
@@ -38,17 +38,10 @@ pub fn turn<const D: usize>(
     if !influences.centre_gradients.is_empty() {
         influences.centre_hoop = vec![0.0; influences.nodes.len()];
     }
-    match basis {
-        Basis::Mpm => turn_points(grid, points, influences),
-        Basis::Gimp => turn_domains(grid, points, influences),
-        Basis::Cpdi1 | Basis::Cpdi2 => Err(Error::Input(
-            "analysis.symmetry = \"axisymmetric\" is for basis = \"mpm\" and basis = \"gimp\""
-                .into(),
-        )),
-    }
+    basis.turn(grid, points, influences)
 }
 
-fn turn_points<const D: usize>(
+pub(super) fn turn_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     influences: &mut Influences<D>,
@@ -72,7 +65,7 @@ fn turn_points<const D: usize>(
     Ok(())
 }
 
-fn turn_domains<const D: usize>(
+pub(super) fn turn_domains<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     influences: &mut Influences<D>,

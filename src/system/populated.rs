@@ -2,8 +2,8 @@
 
 use rustc_hash::FxHashMap;
 
-use crate::basis::{self, Influences};
-use crate::deck::model::Basis;
+use crate::basis::Influences;
+use crate::basis::contract::Basis;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::{Partition, World, exchange};
@@ -32,7 +32,7 @@ impl Populated {
         world: &World,
         grid: &Grid<D>,
         partition: &Partition<D>,
-        (basis, bodies): (Basis, usize),
+        (basis, bodies): (&dyn Basis<D>, usize),
         points: &Points<D>,
         known: Option<&Influences<D>>,
     ) -> Result<Self> {
@@ -46,7 +46,7 @@ impl Populated {
                 let near = met.last().map(|&(entry, _)| entry / groups);
                 match known.and_then(|influences| influences.cells.of(p)) {
                     Some(known) => cells.extend_from_slice(known),
-                    None => basis::populated_cells(grid, basis, points, p, near, &mut cells)?,
+                    None => basis.populated_cells(grid, points, p, near, &mut cells)?,
                 }
                 let (group, bit) =
                     (points.body[p] as usize / GROUP, points.body[p] as usize % GROUP);

@@ -10,9 +10,10 @@ use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use super::terms::surface;
-use crate::basis::{self, Groups, Influences};
-use crate::deck::model::{Basis, Locking, PointVolume, Symmetry};
-use crate::error::Result;
+use crate::basis::contract::{self, Basis};
+use crate::basis::{Groups, Influences, radial};
+use crate::deck::model::{Locking, PointVolume, Symmetry};
+use crate::error::{Error, Result};
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
 use crate::grid::{FacePair, Grid};
 use crate::material::Material;
@@ -95,36 +96,51 @@ impl<const D: usize> Discretisation<D> {
         points: &Points<D>,
         coupling: Coupling,
     ) -> Result<Self> {
+        let method = &model.deck.method;
+        let basis = contract::of_deck(method.basis, method.gimp_edge);
+        Self::with_basis(world, model, points, coupling, &*basis)
+    }
+
+    /// [`Self::with_coupling`] with basis functions of choice. Collective.
+    pub fn with_basis(
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        coupling: Coupling,
+        basis: &dyn Basis<D>,
+    ) -> Result<Self> {
         let (grid, partition) = (&model.grid, &model.partition);
-        let basis = model.deck.method.basis;
-        let mut influences = {
-            let edge = model.deck.method.gimp_edge;
-            world.fail_together(basis::map_points_with(grid, basis, edge, points))?
-        };
-        if basis == Basis::Mpm && coupling != Coupling::Matrix {
+        let mut influences = world.fail_together(basis.map_points(grid, points))?;
+        if basis.of_one_cell() && coupling != Coupling::Matrix {
             face_points::settle(world, grid, partition, points, &mut influences)?;
         }
         if model.deck.method.locking == Locking::FBar {
-            let edge = model.deck.method.gimp_edge;
-            let centres = basis::centre::gradients(grid, basis, edge, points, &influences);
+            let centres = basis.centre_gradients(grid, points, &influences);
             influences.centre_gradients = world.fail_together(centres)?;
         }
         if model.deck.analysis.symmetry == Symmetry::Axisymmetric {
-            let turned = basis::radial::turn(grid, basis, points, &mut influences);
+            let turned = radial::turn(grid, basis, points, &mut influences);
             world.fail_together(turned)?;
         }
         let groups = Groups::new(&influences);
         let kinds = (basis, model.deck.bodies.len());
         let populated = Populated::find(world, grid, partition, kinds, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {
-            Coupling::Matrix | Coupling::Mass => find_faces(world, model, &populated)?,
+            Coupling::Matrix | Coupling::Mass => {
+                let (faces, cells) = find_faces(world, model, &populated)?;
+                require_first_jumps(world, basis, &faces)?;
+                (faces, cells)
+            }
             Coupling::Diagonal => Default::default(),
         };
 
-        // A point's nodes are those of the cells it populates.
+        // What holds the rows' nodes: where they are those of the populated cells, these are fewer.
         let mut reached: Vec<usize> =
             faces.iter().flat_map(|face| face.nodes.iter().copied()).collect();
         append_nodes(world, grid, &populated, &mut reached);
+        if !basis.within_cells() {
+            reached.extend_from_slice(&groups.nodes);
+        }
         let touched = Touched::settle(world, grid, partition, reached)?;
         let supports = (0..groups.len())
             .map(|g| groups.nodes(g))
@@ -139,10 +155,7 @@ impl<const D: usize> Discretisation<D> {
             }
         };
 
-        let locals = |nodes: &[usize]| -> Vec<u32> {
-            nodes.iter().filter_map(|&node| numbering.local(node).map(|i| i as u32)).collect()
-        };
-        let group_nodes = locals(&groups.nodes);
+        let group_nodes = world.fail_together(locals(&numbering, &groups.nodes))?;
         let group_reaches: Vec<bool> = groups
             .node_offsets
             .windows(2)
@@ -154,7 +167,7 @@ impl<const D: usize> Discretisation<D> {
         let group_border = Border::new(group_reaches.into_iter());
         let mut node_grip = vec![0.0; numbering.len()];
         if coupling == Coupling::Matrix {
-            let reach = if basis == Basis::Mpm { grid.cell_size() } else { 0.0 };
+            let reach = if basis.of_one_cell() { grid.cell_size() } else { 0.0 };
             for (p, &group) in groups.group_of_point.iter().enumerate() {
                 let nodes =
                     &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
@@ -168,8 +181,8 @@ impl<const D: usize> Discretisation<D> {
         let mut on_face = vec![0.0; numbering.len()];
         if coupling == Coupling::Matrix {
             for face in &faces {
-                for node in locals(&face.nodes) {
-                    on_face[node as usize] = 1.0;
+                for node in face.nodes.iter().filter_map(|&node| numbering.local(node)) {
+                    on_face[node] = 1.0;
                 }
             }
             for field in [&mut node_grip, &mut on_face] {
@@ -248,12 +261,46 @@ pub fn active<const D: usize>(
     points: &Points<D>,
 ) -> Result<(Populated, Numbering)> {
     let (grid, partition) = (&model.grid, &model.partition);
-    let kinds = (model.deck.method.basis, model.deck.bodies.len());
+    let method = &model.deck.method;
+    let basis = contract::of_deck(method.basis, method.gimp_edge);
+    let kinds = (&*basis, model.deck.bodies.len());
     let populated = Populated::find(world, grid, partition, kinds, points, None)?;
     let mut reached = Vec::new();
     append_nodes(world, grid, &populated, &mut reached);
+    if !basis.within_cells() {
+        reached.extend(world.fail_together(basis.map_points(grid, points))?.nodes);
+    }
     let touched = Touched::settle(world, grid, partition, reached)?;
     Ok((populated, Numbering::build(world, touched.owned, &touched.foreign)?))
+}
+
+/// The local nodes. Error: one has no number, which a basis is to blame for.
+fn locals(numbering: &Numbering, nodes: &[usize]) -> Result<Vec<u32>> {
+    let local = |&node: &usize| {
+        numbering.local(node).map(|local| local as u32).ok_or_else(|| {
+            Error::Environment(format!(
+                "the grid node {node} is in the row of a point and not in the populated cells, \
+                 while the basis says that it stays within them (Basis::within_cells)"
+            ))
+        })
+    };
+    nodes.iter().map(local).collect()
+}
+
+/// Error: Ghost faces, and functions whose first derivatives do not jump. Collective.
+fn require_first_jumps<const D: usize>(
+    world: &World,
+    basis: &dyn Basis<D>,
+    faces: &[FaceStencil],
+) -> Result<()> {
+    if basis.jump_order() == 1 || !world.any(!faces.is_empty()) {
+        return Ok(());
+    }
+    Err(Error::Input(format!(
+        "Ghost faces penalise jumps of first derivatives, and the first derivative of this basis \
+         that jumps is of order {}: set ghost = \"off\"",
+        basis.jump_order()
+    )))
 }
 
 /// Appends the nodes of the populated cells owned or reached here.

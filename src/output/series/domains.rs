@@ -4,14 +4,14 @@
 //! |---|---|
 //! | `mpm` | none: a point |
 //! | `gimp` | x -/+ l_p along each axis |
-//! | `cpdi1` | the parallelogram that [`cpdi1::corner_positions`] works with |
+//! | `cpdi1` | the parallelogram that [`crate::basis::cpdi1::corner_positions`] works with |
 //! | `cpdi2` | the corners that the point carries |
 
 use super::point_field::append_vector;
 use super::xdmf::Topology;
-use crate::basis::cpdi1;
-use crate::deck::model::Basis;
-use crate::points::{Points, rectangle_corners};
+use crate::basis::contract;
+use crate::deck::model::{Basis, GimpEdge};
+use crate::points::Points;
 
 /// The shape of one sub-domain in space of `dimension`; `None` for a basis without domains.
 pub fn topology(basis: Basis, dimension: usize) -> Option<Topology> {
@@ -25,13 +25,8 @@ pub fn topology(basis: Basis, dimension: usize) -> Option<Topology> {
 /// The 2^D corners of point `p`'s domain, counter-clockwise, hex8 order in 3D; the point itself
 /// repeated for `mpm`.
 pub fn corners<const D: usize>(points: &Points<D>, basis: Basis, p: usize) -> [[f64; D]; 8] {
-    let position = points.position[p];
-    match basis {
-        Basis::Mpm => [position; 8],
-        Basis::Gimp => rectangle_corners(position, points.half_length[p]),
-        Basis::Cpdi2 => points.corners[p],
-        Basis::Cpdi1 => cpdi1::corner_positions(points, p),
-    }
+    let basis = contract::of_deck(basis, GimpEdge::Continued);
+    basis.corners(points, p).unwrap_or([points.position[p]; 8])
 }
 
 /// Three columns per corner, 2^D corners per point.

@@ -1,0 +1,228 @@
+//! `trait Basis`: what basis functions owe to the program.
+
+use crate::deck::model::{self, GimpEdge};
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::points::{Points, rectangle_corners};
+
+use super::{Influences, corner, cpdi1, cpdi2, gimp, mpm, radial, row};
+
+/// Basis functions of points: which nodes each touches, with S and its gradient. Everything after
+/// the influences is the same code for all of them.
+pub trait Basis<const D: usize> {
+    /// S and dS/dX~ (1/m) of all points of a rank, nodes ascending in each row. Error: a point, or
+    /// what it needs of its domain, outside the grid, named by id and position.
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>>;
+
+    /// Appends the cells populated by point `p`: strictly overlapped by its domain, or holding it.
+    /// Ghost faces lie around them. A `hint`, a cell near the point, saves a search on a mesh; it
+    /// never changes the answer.
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()>;
+
+    /// Whether the nodes of a row are those of the cells that its point populates. Rows of wider
+    /// functions are numbered by their own nodes.
+    fn within_cells(&self) -> bool {
+        true
+    }
+
+    /// Whether a row is that of one cell: a point on a face has no weight at the nodes off it, but
+    /// a gradient, and could be taken by either cell.
+    fn of_one_cell(&self) -> bool {
+        false
+    }
+
+    /// Order of the lowest derivative of the functions that jumps across a face of the grid. Ghost
+    /// faces penalise jumps of first derivatives.
+    fn jump_order(&self) -> usize {
+        1
+    }
+
+    /// The 2^D corners of point `p`'s domain, counter-clockwise, hex8 order in 3D; `None` for
+    /// points without domains.
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        let _ = (points, p);
+        None
+    }
+
+    /// Gradients at the centres of cells, for F-bar: one for each entry of `influences`, 1/m.
+    fn centre_gradients(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &Influences<D>,
+    ) -> Result<Vec<[f64; D]>> {
+        let _ = (grid, points, influences);
+        Err(Error::Input(
+            "method.locking = \"f-bar\" is for basis = \"mpm\" and basis = \"gimp\"".to_string(),
+        ))
+    }
+
+    /// Makes the rows those of rings ([`super::radial`]), whose hoop entries are there and zero. Error:
+    /// a point that is not off the axis.
+    fn turn(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+    ) -> Result<()> {
+        let _ = (grid, points, influences);
+        Err(Error::Input(
+            "analysis.symmetry = \"axisymmetric\" is for basis = \"mpm\" and basis = \"gimp\"".into(),
+        ))
+    }
+}
+
+/// The basis of a deck. A new one is a line here.
+pub fn of_deck<const D: usize>(basis: model::Basis, edge: GimpEdge) -> Box<dyn Basis<D>> {
+    match basis {
+        model::Basis::Mpm => Box::new(Mpm),
+        model::Basis::Gimp => Box::new(Gimp { edge }),
+        model::Basis::Cpdi1 => Box::new(Cpdi1),
+        model::Basis::Cpdi2 => Box::new(Cpdi2),
+    }
+}
+
+struct Mpm;
+
+impl<const D: usize> Basis<D> for Mpm {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        mpm::map_points(grid, points)
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        mpm::populated_cells(grid, points, p, hint, out)
+    }
+
+    fn of_one_cell(&self) -> bool {
+        true
+    }
+
+    fn centre_gradients(
+        &self,
+        grid: &Grid<D>,
+        _: &Points<D>,
+        influences: &Influences<D>,
+    ) -> Result<Vec<[f64; D]>> {
+        super::centre::of_cells(grid, influences)
+    }
+
+    fn turn(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+    ) -> Result<()> {
+        radial::turn_points(grid, points, influences)
+    }
+}
+
+struct Gimp {
+    /// What a domain that reaches over the grid's edge meets there.
+    edge: GimpEdge,
+}
+
+impl<const D: usize> Basis<D> for Gimp {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        gimp::map_points(grid, self.edge, points)
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        _: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        gimp::populated_cells(grid, points, p, out)
+    }
+
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(rectangle_corners(points.position[p], points.half_length[p]))
+    }
+
+    fn centre_gradients(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        _: &Influences<D>,
+    ) -> Result<Vec<[f64; D]>> {
+        gimp::centre_gradients(grid, self.edge, points)
+    }
+
+    fn turn(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+    ) -> Result<()> {
+        radial::turn_domains(grid, points, influences)
+    }
+}
+
+struct Cpdi1;
+
+impl<const D: usize> Basis<D> for Cpdi1 {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        let mut hint = None;
+        row::map_points(points, |p, row| {
+            cpdi1::corners(points, p)?.fill(grid, points, p, &mut hint, row)
+        })
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        let corners = cpdi1::corner_positions(points, p);
+        corner::populated_cells(grid, points, p, &corners, hint, out)
+    }
+
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(cpdi1::corner_positions(points, p))
+    }
+}
+
+struct Cpdi2;
+
+impl<const D: usize> Basis<D> for Cpdi2 {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        let mut hint = None;
+        row::map_points(points, |p, row| {
+            cpdi2::corners(points, p)?.fill(grid, points, p, &mut hint, row)
+        })
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        corner::populated_cells(grid, points, p, &points.corners[p], hint, out)
+    }
+
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(points.corners[p])
+    }
+}
