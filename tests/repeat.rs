@@ -5,7 +5,7 @@ mod common;
 use common::on_ranks;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
-use mpm_par::petsc::ksp::gathered_lu;
+use mpm_par::analysis::solver::Linear;
 use mpm_par::petsc::{Ksp, Matrix, Session};
 
 const CELLS: usize = 60;
@@ -125,7 +125,7 @@ fn gathered_factors_repeat_bit_by_bit() {
     on_ranks("gathered_factors_repeat_bit_by_bit", &[1, 3, 4], |universe| {
         let _session = Session::start(universe, &[], &[]).unwrap();
         let world = universe.world();
-        let options = gathered_lu(&world);
+        let options = Linear::DirectOnOne.options(world.size() as usize, true);
         assert_eq!(spread(&world, &options, 8), 0.0);
     });
 }

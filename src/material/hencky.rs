@@ -25,12 +25,6 @@ impl Hencky {
         }
     }
 
-    /// From the bulk modulus and the shear modulus, Pa.
-    pub fn from_moduli(bulk: f64, shear: f64) -> Self {
-        let young = 9.0 * bulk * shear / (3.0 * bulk + shear);
-        Hencky { lambda: bulk - 2.0 / 3.0 * shear, mu: shear, young }
-    }
-
     /// Bulk modulus, Pa.
     pub fn bulk_modulus(&self) -> f64 {
         self.lambda + 2.0 / 3.0 * self.mu

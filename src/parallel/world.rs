@@ -69,14 +69,6 @@ impl World {
         result
     }
 
-    pub fn max_usize(&self, value: usize) -> usize {
-        let mut result = 0u64;
-        reducing(|| {
-            self.comm.all_reduce_into(&(value as u64), &mut result, SystemOperation::max())
-        });
-        result as usize
-    }
-
     pub fn sum_usize(&self, value: usize) -> usize {
         let mut result = 0u64;
         reducing(|| {

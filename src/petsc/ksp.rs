@@ -7,8 +7,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
 use super::abort::unless_shared;
-use super::check::{agree, bool_of, c_text, petsc, require_running, running, text_of};
-use super::vector::index;
+use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::{Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
@@ -76,24 +75,6 @@ impl Ksp {
         petsc!(KSPSetFromOptions(self.raw)).map_err(|error| unless_shared(&self.comm, error))
     }
 
-    /// Relative and absolute residual, iterations; `None` leaves a value as it is.
-    pub fn set_tolerances(
-        &mut self,
-        relative: Option<f64>,
-        absolute: Option<f64>,
-        iterations: Option<usize>,
-    ) -> Result<()> {
-        let default = f64::from(sys::PETSC_DEFAULT);
-        let iterations = iterations.map_or(Ok(sys::PETSC_DEFAULT), index)?;
-        petsc!(KSPSetTolerances(
-            self.raw,
-            relative.unwrap_or(default),
-            absolute.unwrap_or(default),
-            default,
-            iterations
-        ))
-    }
-
     /// The matrix of the next solves. After a change of its values call this again, unless
     /// the old preconditioner is to serve on. Another matrix may have another size and pattern.
     pub fn set_operators(&mut self, matrix: &Matrix) -> Result<()> {
@@ -102,16 +83,6 @@ impl Ksp {
         }
         self.matrix = matrix.id();
         petsc!(KSPSetOperators(self.raw, matrix.raw(), matrix.raw()))
-    }
-
-    /// Keep the preconditioner (or factors) although the matrix changes.
-    pub fn set_reuse_preconditioner(&mut self, reuse: bool) -> Result<()> {
-        petsc!(KSPSetReusePreconditioner(self.raw, bool_of(reuse)))
-    }
-
-    /// Start from the vector passed as solution instead of zero.
-    pub fn set_initial_guess_nonzero(&mut self, nonzero: bool) -> Result<()> {
-        petsc!(KSPSetInitialGuessNonzero(self.raw, bool_of(nonzero)))
     }
 
     /// Keep what [`Self::extreme_singular_values`] needs. Call before the solve.
@@ -173,23 +144,6 @@ pub(crate) fn forget(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
     petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
     petsc!(PCSetType(pc, kind.as_ptr()))?;
     petsc!(PCSetFromOptions(pc)).map_err(|error| unless_shared(comm, error))
-}
-
-/// Options of a direct solver whose answer repeats bit by bit on any number of ranks: the
-/// system is gathered and factored on one. For problems small enough for one core.
-///
-/// The distributed LU of MUMPS and of SuperLU_DIST add contributions in the order of their
-/// arrival: on three ranks and more, and at times on two, solutions of equal systems differ by
-/// round-off (seen: 1e-17 to 3e-14 relative). MUMPS Cholesky of definite matrices was not seen to differ.
-pub fn gathered_lu(comm: &SimpleCommunicator) -> Vec<(&'static str, String)> {
-    vec![
-        ("ksp_type", "preonly".into()),
-        ("pc_type", "telescope".into()),
-        ("pc_telescope_reduction_factor", comm.size().to_string()),
-        ("telescope_ksp_type", "preonly".into()),
-        ("telescope_pc_type", "lu".into()),
-        ("telescope_pc_factor_mat_solver_type", "mumps".into()),
-    ]
 }
 
 /// How the ranks came to an [`outcome`].

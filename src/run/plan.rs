@@ -51,7 +51,6 @@ pub fn of<const D: usize>(
         equations: nodes * D,
         points_per_rank: world.sum_slice(&per_rank).into_iter().map(|n| n as usize).collect(),
         imbalance: imbalance(world, points.len()),
-        cut_faces: None,
         estimated_memory: Some(
             memory::<D>(deck.method.basis, all_points as f64, nodes as f64) as u64
         ),

@@ -19,7 +19,7 @@ pub fn deck(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/decks").join(format!("{name}.toml"))
 }
 
-/// Solver options whose answers repeat bit by bit on `n` ranks (`petsc::ksp::gathered_lu`).
+/// Solver options whose answers repeat bit by bit on `n` ranks (those of `Linear::DirectOnOne`).
 pub fn repeatable(n: usize) -> Vec<String> {
     [
         "-qs_ksp_type preonly",

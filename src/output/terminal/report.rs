@@ -41,8 +41,6 @@ pub struct Plan {
     pub points_per_rank: Vec<usize>,
     /// Largest cost of a rank over the mean.
     pub imbalance: f64,
-    /// Share of the faces between populated cells that lie between ranks.
-    pub cut_faces: Option<f64>,
     /// Bytes, of all ranks.
     pub estimated_memory: Option<u64>,
     /// Bytes, of all result files.
@@ -70,9 +68,6 @@ pub fn plan(plan: &Plan) -> String {
         count(plan.points_per_rank.len(), "rank"),
         plan.imbalance
     );
-    if let Some(cut) = plan.cut_faces {
-        let _ = write!(partition, ", {:.1} % of the faces cut", 100.0 * cut);
-    }
     if empty > 0 {
         let _ = write!(partition, ", {} without points", count(empty, "rank"));
     }
@@ -282,7 +277,6 @@ mod tests {
             equations: 66,
             points_per_rank: vec![44, 36, 0],
             imbalance: 1.65,
-            cut_faces: Some(0.0526),
             estimated_memory: Some(1_500_000),
             estimated_output: None,
         });
@@ -290,8 +284,7 @@ mod tests {
             text,
             "\nBeam\n  analysis   quasi-static, 50 steps\n  \
              problem    80 points in 20 cells, 33 nodes active, 66 equations\n  \
-             partition  3 ranks, 0 to 44 points each, imbalance 1.65, 5.3 % of the faces cut, \
-             1 rank without points\n  \
+             partition  3 ranks, 0 to 44 points each, imbalance 1.65, 1 rank without points\n  \
              memory     about 1.5 MB in all\n"
         );
     }
