@@ -1,11 +1,9 @@
 //! The grammar of formulas, with the usual precedence: `||`, `&&`, comparisons, `+ -`, `* /`,
-//! sign and `!`, `^` (right associative).
-//!
-//! exmex binds a sign more tightly than a power (`-x^2` would be `(-x)^2`) and has its own
-//! order of operators; the fully parenthesised text written here leaves it no choice.
+//! sign and `!`, `^` (right associative, and tighter than a sign before it: -x^2 is -(x^2)).
 
 use super::Variable;
-use super::operators::{BINARY_FUNCTIONS, CONSTANTS, FUNCTIONS, OTHERWISE, THEN};
+use super::operators::{self, BINARY_FUNCTIONS, CONSTANTS, FUNCTIONS};
+use super::program::{Operation, Program};
 
 /// Depth of nested parentheses and powers that is accepted.
 const DEEPEST: usize = 60;
@@ -23,16 +21,17 @@ const SYMBOLS: [&str; 18] = [
     "**", "<=", ">=", "==", "!=", "&&", "||", "<", ">", "+", "-", "*", "/", "^", "!", "(", ")", ",",
 ];
 
-/// Checks a formula and writes it with all parentheses, numbers without exponents.
-pub fn normalise(text: &str) -> Result<String, String> {
+/// The operations of a formula. Error: it is none, with the place and what would be right.
+pub fn parse(text: &str) -> Result<Program, String> {
     let tokens = tokenise(text)?;
-    let mut parser = Parser { text, tokens, next: 0, depth: 0 };
+    let program = Program::default();
+    let mut parser = Parser { text, tokens, next: 0, depth: 0, program };
     if *parser.peek() == Token::End {
         return Err("the expression is empty".to_string());
     }
-    let normal = parser.level(0)?;
+    parser.level(0)?;
     match parser.peek() {
-        Token::End => Ok(normal),
+        Token::End => Ok(parser.program),
         _ => Err(parser.unexpected("an operator or the end")),
     }
 }
@@ -42,7 +41,7 @@ pub fn unknown_name(text: &str, name: &str) -> String {
     let candidates = Variable::ALL
         .iter()
         .map(|v| v.name())
-        .chain(FUNCTIONS)
+        .chain(FUNCTIONS.map(|(name, _)| name))
         .chain(BINARY_FUNCTIONS)
         .chain(["if", "pi"]);
     let near = candidates
@@ -58,7 +57,7 @@ pub fn vocabulary() -> String {
     format!(
         "variables: {}; functions: {} {} if(c,a,b); constants: pi tau e; operators: + - * / ^ < <= > >= == != && || !",
         Variable::ALL.map(Variable::name).join(" "),
-        FUNCTIONS.join(" "),
+        FUNCTIONS.map(|(name, _)| name).join(" "),
         BINARY_FUNCTIONS.join(" ")
     )
 }
@@ -121,6 +120,7 @@ struct Parser<'a> {
     tokens: Vec<(usize, Token)>,
     next: usize,
     depth: usize,
+    program: Program,
 }
 
 /// Binary operators from the loosest level to the tightest; comparisons do not chain.
@@ -165,14 +165,14 @@ impl Parser<'_> {
         format!("in \"{}\", character {column}: expected {expected}, found {found}", self.text)
     }
 
-    fn level(&mut self, level: usize) -> Result<String, String> {
+    fn level(&mut self, level: usize) -> Result<(), String> {
         if level == LEVELS.len() {
             return self.signed();
         }
-        let mut left = self.level(level + 1)?;
+        self.level(level + 1)?;
         while let Some(symbol) = self.accept(LEVELS[level]) {
-            let right = self.level(level + 1)?;
-            left = format!("({left} {symbol} {right})");
+            self.level(level + 1)?;
+            self.binary(symbol);
             if level == COMPARISON && LEVELS[level].iter().any(|s| *self.peek() == Token::Symbol(s))
             {
                 return Err(format!(
@@ -181,35 +181,49 @@ impl Parser<'_> {
                 ));
             }
         }
-        Ok(left)
+        Ok(())
     }
 
-    fn signed(&mut self) -> Result<String, String> {
+    /// Appends an operator of two arguments; its symbol is in the grammar.
+    fn binary(&mut self, symbol: &str) {
+        if let Some(place) = operators::binary(symbol) {
+            self.program.push(Operation::Binary(place));
+        }
+    }
+
+    fn signed(&mut self) -> Result<(), String> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(format!("\"{}\" is nested too deeply", self.text));
         }
-        let text = match self.accept(&["-", "+", "!"]) {
-            Some("-") => format!("(-({}))", self.signed()?),
-            Some("!") => format!("(!({}))", self.signed()?),
+        match self.accept(&["-", "+", "!"]) {
+            Some("-") => {
+                self.signed()?;
+                self.program.push(Operation::Negate);
+            }
+            Some("!") => {
+                self.signed()?;
+                self.program.push(Operation::Not);
+            }
             Some(_) => self.signed()?,
             None => {
-                let base = self.primary()?;
-                match self.accept(&["^"]) {
-                    Some(_) => format!("({base} ^ {})", self.signed()?),
-                    None => base,
+                self.primary()?;
+                if self.accept(&["^"]).is_some() {
+                    self.signed()?;
+                    self.binary("^");
                 }
             }
-        };
+        }
         self.depth -= 1;
-        Ok(text)
+        Ok(())
     }
 
-    fn primary(&mut self) -> Result<String, String> {
+    fn primary(&mut self) -> Result<(), String> {
         match self.peek().clone() {
             Token::Number(value) => {
                 self.take();
-                Ok(number(value))
+                self.program.push(Operation::Number(value));
+                Ok(())
             }
             Token::Name(name) => {
                 self.take();
@@ -217,68 +231,76 @@ impl Parser<'_> {
             }
             Token::Symbol("(") => {
                 self.take();
-                let inner = self.level(0)?;
-                self.expect(")")?;
-                Ok(inner)
+                self.level(0)?;
+                self.expect(")")
             }
             _ => Err(self.unexpected("a number, a variable, a function or `(`")),
         }
     }
 
-    fn word(&self, name: &str) -> Result<String, String> {
+    fn word(&mut self, name: &str) -> Result<(), String> {
         if let Some((_, value)) = CONSTANTS.iter().find(|(known, _)| *known == name) {
-            return Ok(number(*value));
+            self.program.push(Operation::Number(*value));
+            return Ok(());
         }
-        if Variable::from_name(name).is_some() {
-            return Ok(name.to_string());
+        if let Some(variable) = Variable::from_name(name) {
+            self.program.push(Operation::Variable(variable));
+            return Ok(());
         }
-        let function = FUNCTIONS.contains(&name) || BINARY_FUNCTIONS.contains(&name);
+        let function = operators::function(name).is_some() || BINARY_FUNCTIONS.contains(&name);
         if function || name == "if" {
             return Err(self.unexpected(&format!("`(` after `{name}`")));
         }
         Err(unknown_name(self.text, name))
     }
 
-    fn call(&mut self, name: &str) -> Result<String, String> {
-        if name != "if" && !FUNCTIONS.contains(&name) && !BINARY_FUNCTIONS.contains(&name) {
+    fn call(&mut self, name: &str) -> Result<(), String> {
+        let function = operators::function(name);
+        let of_two = BINARY_FUNCTIONS.contains(&name);
+        if name != "if" && function.is_none() && !of_two {
             return Err(unknown_name(self.text, name));
         }
         self.expect("(")?;
-        let mut arguments = vec![self.level(0)?];
+        self.level(0)?;
+        let mut count = 1;
+        let mut jumps = Vec::new();
         while self.accept(&[","]).is_some() {
-            arguments.push(self.level(0)?);
+            match (name, count) {
+                ("if", 1) => jumps.push(self.program.branch(Operation::Unless)),
+                ("if", 2) => {
+                    let end = self.program.branch(Operation::Skip);
+                    self.program.land(jumps[0]);
+                    jumps.push(end);
+                }
+                _ => {}
+            }
+            self.level(0)?;
+            count += 1;
+            // As many arguments as one likes, from the left.
+            if of_two {
+                self.binary(name);
+            }
         }
         self.expect(")")?;
         let wanted = match name {
             "if" => 3,
             "atan2" => 2,
-            "min" | "max" => arguments.len().max(2),
+            "min" | "max" => count.max(2),
             _ => 1,
         };
-        if arguments.len() != wanted {
+        if count != wanted {
             return Err(format!(
-                "`{name}` takes {wanted} argument{}, found {} in \"{}\"",
+                "`{name}` takes {wanted} argument{}, found {count} in \"{}\"",
                 if wanted == 1 { "" } else { "s" },
-                arguments.len(),
                 self.text
             ));
         }
-        Ok(match name {
-            "if" => {
-                let [c, a, b] = [&arguments[0], &arguments[1], &arguments[2]];
-                format!("(({c} {THEN} {a}) {OTHERWISE} {b})")
-            }
-            _ if BINARY_FUNCTIONS.contains(&name) => {
-                let mut all = arguments.into_iter();
-                let first = all.next().unwrap_or_default();
-                all.fold(first, |left, right| format!("({left} {name} {right})"))
-            }
-            _ => format!("{name}({})", arguments[0]),
-        })
+        if let Some(&end) = jumps.get(1) {
+            self.program.land(end);
+        }
+        if let Some(place) = function {
+            self.program.push(Operation::Function(place));
+        }
+        Ok(())
     }
-}
-
-/// Rust writes floats in full, shortest exact digits and no exponent: what exmex can read.
-fn number(value: f64) -> String {
-    value.to_string()
 }

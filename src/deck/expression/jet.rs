@@ -3,7 +3,6 @@
 //! `max`, `min` and `abs` have derivatives once they are averaged over a width.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
-use std::str::FromStr;
 
 /// Index of d2/dX_i dX_j in [`Jet::second`].
 const PLACE: [[usize; 3]; 3] = [[0, 1, 2], [1, 3, 4], [2, 4, 5]];
@@ -129,14 +128,6 @@ impl Jet {
     }
 }
 
-impl FromStr for Jet {
-    type Err = std::num::ParseFloatError;
-
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        text.parse().map(Jet::constant)
-    }
-}
-
 impl Add for Jet {
     type Output = Self;
 
@@ -208,7 +199,7 @@ fn atan(a: Jet) -> Jet {
 }
 
 /// Value, first and second derivative of a function of one argument.
-type Rule = fn(f64) -> [f64; 3];
+pub type Rule = fn(f64) -> [f64; 3];
 
 /// Every function with derivatives everywhere in its domain.
 pub const RULES: [(&str, Rule); 19] = [

@@ -2,26 +2,26 @@
 //!
 //! | file | idea |
 //! |---|---|
-//! | `mod.rs` | [`Expression`]: evaluation on the exmex crate |
-//! | `grammar.rs` | the deck's grammar, rewritten to the fully parenthesised form that exmex reads |
-//! | `operators.rs` | the operators and functions known to both |
+//! | `mod.rs` | [`Expression`]: a formula and what it depends on |
+//! | `grammar.rs` | the deck's grammar |
+//! | `operators.rs` | operators and functions on plain numbers |
+//! | `program.rs` | a formula as operations on a stack, for any kind of number |
 //! | `jet.rs` | [`Jet`]: numbers that carry their first and second derivatives |
 //! | `smooth.rs` | [`Smooth`]: a formula evaluated on jets |
 
 mod grammar;
 pub mod jet;
 mod operators;
+mod program;
 pub mod smooth;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
 
-use exmex::{Express, FlatEx};
-
 pub use grammar::vocabulary;
 pub use jet::Jet;
-use operators::Operators;
+use program::Program;
 pub use smooth::Smooth;
 
 /// Values of the variables. In 2D the third components are zero.
@@ -100,14 +100,7 @@ impl Variable {
 pub struct Expression {
     text: String,
     constant: Option<f64>,
-    /// The formula and the variables it takes, in its order; absent for constants.
-    formula: Option<Arc<Formula>>,
-}
-
-#[derive(Debug)]
-struct Formula {
-    flat: FlatEx<f64, Operators>,
-    variables: Vec<Variable>,
+    formula: Arc<Program>,
 }
 
 impl PartialEq for Expression {
@@ -119,12 +112,16 @@ impl PartialEq for Expression {
 impl Expression {
     /// Parses a formula; the message says what is wrong and lists variables and functions.
     pub fn parse(text: &str) -> Result<Self, String> {
-        let normal = grammar::normalise(text)?;
-        Self::from_normal_form(text.to_string(), &normal)
+        let program = grammar::parse(text)?;
+        let varies = Variable::ALL.iter().any(|&variable| program.contains(variable));
+        let constant = (!varies).then(|| program.number(&Scope::default()));
+        Ok(Expression { text: text.to_string(), constant, formula: Arc::new(program) })
     }
 
     pub fn constant(value: f64) -> Self {
-        Expression { text: value.to_string(), constant: Some(value), formula: None }
+        let mut program = Program::default();
+        program.push(program::Operation::Number(value));
+        Expression { text: value.to_string(), constant: Some(value), formula: Arc::new(program) }
     }
 
     pub fn text(&self) -> &str {
@@ -137,7 +134,7 @@ impl Expression {
     }
 
     pub fn depends_on(&self, variable: Variable) -> bool {
-        self.formula.as_ref().is_some_and(|formula| formula.variables.contains(&variable))
+        self.formula.contains(variable)
     }
 
     /// True if it contains `s` or `t`.
@@ -147,44 +144,17 @@ impl Expression {
 
     /// The value; not a number where the formula has none (for example `ln(-1)`).
     pub fn value(&self, scope: &Scope) -> f64 {
-        if let Some(value) = self.constant {
-            return value;
-        }
-        let Some(formula) = &self.formula else { return f64::NAN };
-        let mut values = [0.0; Variable::ALL.len()];
-        let count = formula.variables.len();
-        for (value, &variable) in values.iter_mut().zip(&formula.variables) {
-            *value = scope.value(variable);
-        }
-        formula.flat.eval(&values[..count]).unwrap_or(f64::NAN)
+        self.constant.unwrap_or_else(|| self.formula.number(scope))
     }
 
     /// The formula with its derivatives. Error: it contains a function or an operator that is
     /// not smooth (comparisons, `min`, `max`, `if`, `abs`, ...).
     pub fn smooth(&self) -> Result<Smooth, String> {
-        let normal = grammar::normalise(&self.text)?;
-        Smooth::parse(&normal, false).map_err(|why| format!("\"{}\": {why}", self.text))
+        Smooth::new(self.formula.clone(), false).map_err(|why| format!("\"{}\": {why}", self.text))
     }
 
     /// As [`Self::smooth`], with `min`, `max` and `abs` averaged over a width.
     pub fn averaged(&self) -> Result<Smooth, String> {
-        let normal = grammar::normalise(&self.text)?;
-        Smooth::parse(&normal, true).map_err(|why| format!("\"{}\": {why}", self.text))
-    }
-
-    fn from_normal_form(text: String, normal: &str) -> Result<Self, String> {
-        let flat = FlatEx::<f64, Operators>::parse(normal)
-            .map_err(|e| format!("cannot read \"{text}\": {e}"))?;
-        let variables: Vec<Variable> = flat
-            .var_names()
-            .iter()
-            .map(|name| Variable::from_name(name).ok_or_else(|| grammar::unknown_name(&text, name)))
-            .collect::<Result<_, _>>()?;
-        if variables.is_empty() {
-            let value = flat.eval(&[]).map_err(|e| format!("cannot read \"{text}\": {e}"))?;
-            return Ok(Expression { text, constant: Some(value), formula: None });
-        }
-        let formula = Some(Arc::new(Formula { flat, variables }));
-        Ok(Expression { text, constant: None, formula })
+        Smooth::new(self.formula.clone(), true).map_err(|why| format!("\"{}\": {why}", self.text))
     }
 }

@@ -1,14 +1,54 @@
-//! Operators and functions of formulas: exmex's, and what the deck adds to them.
-
-use exmex::{BinOp, FloatOpsFactory, MakeOperators, Operator};
+//! Operators and functions of formulas on plain numbers.
 
 /// Functions of one argument. `log` is the natural logarithm, as `ln`.
-pub const FUNCTIONS: [&str; 24] = [
-    "abs", "acos", "acosh", "asin", "asinh", "atan", "atanh", "cbrt", "ceil", "cos", "cosh", "exp",
-    "floor", "fract", "ln", "log", "log10", "log2", "signum", "sin", "sinh", "sqrt", "tan", "tanh",
+pub const FUNCTIONS: [(&str, fn(f64) -> f64); 24] = [
+    ("abs", f64::abs),
+    ("acos", f64::acos),
+    ("acosh", f64::acosh),
+    ("asin", f64::asin),
+    ("asinh", f64::asinh),
+    ("atan", f64::atan),
+    ("atanh", f64::atanh),
+    ("cbrt", f64::cbrt),
+    ("ceil", f64::ceil),
+    ("cos", f64::cos),
+    ("cosh", f64::cosh),
+    ("exp", f64::exp),
+    ("floor", f64::floor),
+    ("fract", f64::fract),
+    ("ln", f64::ln),
+    ("log", f64::ln),
+    ("log10", f64::log10),
+    ("log2", f64::log2),
+    ("signum", f64::signum),
+    ("sin", f64::sin),
+    ("sinh", f64::sinh),
+    ("sqrt", f64::sqrt),
+    ("tan", f64::tan),
+    ("tanh", f64::tanh),
 ];
 
-/// Functions of two arguments; `min` and `max` take any number.
+/// Operators of two arguments, and functions of two; `min` and `max` take any number.
+pub const BINARY: [(&str, fn(f64, f64) -> f64); 16] = [
+    ("+", |a, b| a + b),
+    ("-", |a, b| a - b),
+    ("*", |a, b| a * b),
+    ("/", |a, b| a / b),
+    ("^", f64::powf),
+    ("<", |a, b| truth(a < b)),
+    ("<=", |a, b| truth(a <= b)),
+    (">", |a, b| truth(a > b)),
+    (">=", |a, b| truth(a >= b)),
+    ("==", |a, b| truth(a == b)),
+    ("!=", |a, b| truth(a != b)),
+    ("&&", |a, b| truth(holds(a) && holds(b))),
+    ("||", |a, b| truth(holds(a) || holds(b))),
+    ("atan2", f64::atan2),
+    ("max", f64::max),
+    ("min", f64::min),
+];
+
+/// Those of [`BINARY`] that are written as functions.
 pub const BINARY_FUNCTIONS: [&str; 3] = ["atan2", "max", "min"];
 
 /// Names that stand for numbers.
@@ -19,53 +59,20 @@ pub const CONSTANTS: [(&str, f64); 4] = [
     ("e", std::f64::consts::E),
 ];
 
-/// The names that `if(c, a, b)` becomes: `((c) THEN (a)) OTHERWISE (b)`.
-pub const THEN: &str = "__then__";
-pub const OTHERWISE: &str = "__otherwise__";
+/// The place of a function of one argument in [`FUNCTIONS`].
+pub fn function(name: &str) -> Option<usize> {
+    FUNCTIONS.iter().position(|(known, _)| *known == name)
+}
 
-/// A quiet NaN with a payload of its own: "the condition did not hold".
-const ELSE: u64 = 0x7ff8_6d70_6d5f_656c;
+/// The place of an operator or function of two arguments in [`BINARY`].
+pub fn binary(name: &str) -> Option<usize> {
+    BINARY.iter().position(|(known, _)| *known == name)
+}
 
-fn truth(value: bool) -> f64 {
+pub fn truth(value: bool) -> f64 {
     if value { 1.0 } else { 0.0 }
 }
 
-fn holds(value: f64) -> bool {
+pub fn holds(value: f64) -> bool {
     value != 0.0 && !value.is_nan()
-}
-
-/// exmex's operators plus comparisons, logic, `atan2`, `min`, `max`, inverse hyperbolic
-/// functions and the two halves of `if`. Priorities do not matter: input comes parenthesised.
-#[derive(Clone, Debug)]
-pub struct Operators;
-
-impl MakeOperators<f64> for Operators {
-    fn make<'a>() -> Vec<Operator<'a, f64>> {
-        let binary = |name: &'a str, apply: fn(f64, f64) -> f64| {
-            Operator::make_bin(name, BinOp { apply, prio: -1, is_commutative: false })
-        };
-        let mut operators = FloatOpsFactory::<f64>::make();
-        let known: Vec<&str> = operators.iter().map(|operator| operator.repr()).collect();
-        let additions = [
-            binary("<", |a, b| truth(a < b)),
-            binary("<=", |a, b| truth(a <= b)),
-            binary(">", |a, b| truth(a > b)),
-            binary(">=", |a, b| truth(a >= b)),
-            binary("==", |a, b| truth(a == b)),
-            binary("!=", |a, b| truth(a != b)),
-            binary("&&", |a, b| truth(holds(a) && holds(b))),
-            binary("||", |a, b| truth(holds(a) || holds(b))),
-            binary("atan2", f64::atan2),
-            binary("min", f64::min),
-            binary("max", f64::max),
-            binary(THEN, |c, a| if holds(c) { a } else { f64::from_bits(ELSE) }),
-            binary(OTHERWISE, |a, b| if a.to_bits() == ELSE { b } else { a }),
-            Operator::make_unary("!", |a| truth(!holds(a))),
-            Operator::make_unary("asinh", f64::asinh),
-            Operator::make_unary("acosh", f64::acosh),
-            Operator::make_unary("atanh", f64::atanh),
-        ];
-        operators.extend(additions.into_iter().filter(|o| !known.contains(&o.repr())));
-        operators
-    }
 }

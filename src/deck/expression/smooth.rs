@@ -1,24 +1,27 @@
 //! A formula evaluated on [`Jet`]s: exact first and second derivatives at the cost of a few
 //! evaluations, however nested the formula is.
 
-use exmex::{BinOp, Express, FlatEx, MakeOperators, Operator};
+use std::sync::{Arc, LazyLock};
 
-use super::jet::{Jet, RULES};
+use super::jet::{Jet, RULES, Rule};
+use super::operators::{BINARY, FUNCTIONS};
+use super::program::{Arithmetic, Operation, Program};
 use super::{Scope, Variable};
 
 /// A formula of X, Y, Z (and s, t as parameters) with its derivatives.
 #[derive(Debug, Clone)]
-pub struct Smooth {
-    flat: FlatEx<Jet, JetOperators>,
-    variables: Vec<Variable>,
-}
+pub struct Smooth(Arc<Program>);
+
+/// Functions with a kink: smooth once they are averaged over a width.
+const KINKED: [&str; 3] = ["max", "min", "abs"];
+/// Operators of two arguments that are smooth.
+const SMOOTH: [&str; 6] = ["+", "-", "*", "/", "^", "atan2"];
 
 impl Smooth {
-    /// From the fully parenthesised form. Error: an operator or function without a rule.
-    /// `averaged`: functions with a kink are allowed.
-    pub(crate) fn parse(normal: &str, averaged: bool) -> Result<Self, String> {
+    /// Error: an operator or function without a rule. `averaged`: functions with a kink are allowed.
+    pub(crate) fn new(program: Arc<Program>, averaged: bool) -> Result<Self, String> {
         let kinked: &[&str] = if averaged { &KINKED } else { &[] };
-        if let Some(name) = without_rule(normal, kinked) {
+        if let Some(name) = without_rule(&program, kinked) {
             return Err(format!(
                 "`{name}` has no derivative rule; use + - * / ^ atan2 {}",
                 RULES
@@ -29,13 +32,7 @@ impl Smooth {
                     .join(" ")
             ));
         }
-        let flat = FlatEx::parse(normal).map_err(|error| error.to_string())?;
-        let variables = flat
-            .var_names()
-            .iter()
-            .map(|name| Variable::from_name(name).ok_or_else(|| format!("unknown name `{name}`")))
-            .collect::<Result<_, _>>()?;
-        Ok(Smooth { flat, variables })
+        Ok(Smooth(program))
     }
 
     /// The value and its derivatives with respect to X, Y, Z; x, y, z, s and t count as constant.
@@ -52,72 +49,80 @@ impl Smooth {
     }
 
     fn evaluate(&self, scope: &Scope, axes: [Variable; 3], reach: [f64; 3]) -> Jet {
-        let mut values = [Jet::default(); Variable::ALL.len()];
-        for (value, &variable) in values.iter_mut().zip(&self.variables) {
+        self.0.value(|variable| {
             let number = scope.value(variable);
-            *value = match axes.iter().position(|axis| *axis == variable) {
+            match axes.iter().position(|axis| *axis == variable) {
                 Some(axis) => Jet::coordinate(number, axis).within(reach),
                 None => Jet::constant(number),
-            };
+            }
+        })
+    }
+}
+
+/// The first operator or function of a formula that has no derivative everywhere; `if` before all.
+fn without_rule(program: &Program, kinked: &[&str]) -> Option<&'static str> {
+    let smooth = |name: &str| {
+        RULES.iter().any(|(known, _)| *known == name)
+            || SMOOTH.contains(&name)
+            || kinked.contains(&name)
+    };
+    let operations = program.operations();
+    if operations.iter().any(|operation| matches!(operation, Operation::Unless(_))) {
+        return Some("if");
+    }
+    operations.iter().find_map(|operation| {
+        let name = match *operation {
+            Operation::Not => "!",
+            Operation::Function(place) => FUNCTIONS[place].0,
+            Operation::Binary(place) => BINARY[place].0,
+            _ => return None,
+        };
+        (!smooth(name)).then_some(name)
+    })
+}
+
+/// The rule of each of [`FUNCTIONS`].
+static RULE_OF: LazyLock<[Option<Rule>; FUNCTIONS.len()]> = LazyLock::new(|| {
+    FUNCTIONS.map(|(name, _)| RULES.iter().find(|(known, _)| *known == name).map(|(_, rule)| *rule))
+});
+
+impl Arithmetic for Jet {
+    fn number(value: f64) -> Self {
+        Jet::constant(value)
+    }
+
+    fn negated(self) -> Self {
+        -self
+    }
+
+    /// Formulas that branch are not smooth: [`Smooth::new`] refuses them.
+    fn inverted(self) -> Self {
+        Jet::constant(f64::NAN)
+    }
+
+    fn holds(self) -> bool {
+        self.value.holds()
+    }
+
+    fn function(self, place: usize) -> Self {
+        match RULE_OF[place] {
+            Some(rule) => self.apply(rule(self.value)),
+            None if FUNCTIONS[place].0 == "abs" => self.abs(),
+            None => Jet::constant(f64::NAN),
         }
-        let nowhere = Jet::constant(f64::NAN);
-        self.flat.eval(&values[..self.variables.len()]).unwrap_or(nowhere)
     }
-}
 
-/// The first operator or function of a normal form that has no derivative everywhere.
-fn without_rule(normal: &str, kinked: &[&str]) -> Option<String> {
-    const SYMBOLS: [&str; 9] = ["<=", ">=", "==", "!=", "<", ">", "&&", "||", "!"];
-    if normal.contains(super::operators::THEN) {
-        return Some("if".to_string());
+    fn binary(self, place: usize, other: Self) -> Self {
+        match BINARY[place].0 {
+            "+" => self + other,
+            "-" => self - other,
+            "*" => self * other,
+            "/" => self / other,
+            "^" => self.power(other),
+            "atan2" => self.atan2(other),
+            "max" => self.max(other),
+            "min" => self.min(other),
+            _ => Jet::constant(f64::NAN),
+        }
     }
-    if let Some(symbol) = SYMBOLS.into_iter().find(|symbol| normal.contains(symbol)) {
-        return Some(symbol.to_string());
-    }
-    let smooth = |word: &&str| RULES.iter().any(|(name, _)| name == word) || *word == "atan2";
-    let words = normal.split(|c: char| !c.is_ascii_alphanumeric());
-    let mut functions = words.filter(|word| {
-        word.starts_with(|c: char| c.is_ascii_alphabetic()) && Variable::from_name(word).is_none()
-    });
-    functions.find(|word| !smooth(word) && !kinked.contains(word)).map(str::to_string)
-}
-
-/// Functions with a kink: smooth once they are averaged over a width.
-const KINKED: [&str; 3] = ["max", "min", "abs"];
-
-/// The smooth ones of the deck's operators, and those with a kink, on jets.
-#[derive(Clone, Debug)]
-struct JetOperators;
-
-impl MakeOperators<Jet> for JetOperators {
-    fn make<'a>() -> Vec<Operator<'a, Jet>> {
-        // Priorities do not matter: input comes parenthesised.
-        let binary = |apply: fn(Jet, Jet) -> Jet| BinOp { apply, prio: 1, is_commutative: false };
-        let mut operators = vec![
-            Operator::make_bin_unary("-", binary(|a, b| a - b), |a| -a),
-            Operator::make_bin("+", binary(|a, b| a + b)),
-            Operator::make_bin("*", binary(|a, b| a * b)),
-            Operator::make_bin("/", binary(|a, b| a / b)),
-            Operator::make_bin("^", binary(Jet::power)),
-            Operator::make_bin("atan2", binary(Jet::atan2)),
-            Operator::make_bin("max", binary(Jet::max)),
-            Operator::make_bin("min", binary(Jet::min)),
-            Operator::make_unary("abs", Jet::abs),
-        ];
-        operators.extend(unary());
-        operators
-    }
-}
-
-/// exmex takes plain functions, so each rule needs one of its own: instance `N` applies rule `N`.
-fn unary<'a>() -> Vec<Operator<'a, Jet>> {
-    fn rule<const N: usize>(a: Jet) -> Jet {
-        a.apply(RULES[N].1(a.value))
-    }
-    macro_rules! all {
-        ($($n:literal)*) => { vec![$( Operator::make_unary(RULES[$n].0, rule::<$n>) ),*] };
-    }
-    let made = all!(0 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16 17 18);
-    debug_assert_eq!(made.len(), RULES.len());
-    made
 }
