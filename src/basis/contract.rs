@@ -66,7 +66,7 @@ pub trait Basis<const D: usize> {
 
     /// Makes the rows those of rings ([`super::radial`]), whose hoop entries are there and zero. Error:
     /// a point that is not off the axis.
-    fn turn(
+    fn make_rings(
         &self,
         grid: &Grid<D>,
         points: &Points<D>,
@@ -74,7 +74,8 @@ pub trait Basis<const D: usize> {
     ) -> Result<()> {
         let _ = (grid, points, influences);
         Err(Error::Input(
-            "analysis.symmetry = \"axisymmetric\" is for basis = \"mpm\" and basis = \"gimp\"".into(),
+            "analysis.symmetry = \"axisymmetric\" is for basis = \"mpm\" and basis = \"gimp\""
+                .into(),
         ))
     }
 }
@@ -120,7 +121,7 @@ impl<const D: usize> Basis<D> for Mpm {
         super::centre::of_cells(grid, influences)
     }
 
-    fn turn(
+    fn make_rings(
         &self,
         grid: &Grid<D>,
         points: &Points<D>,
@@ -164,7 +165,7 @@ impl<const D: usize> Basis<D> for Gimp {
         gimp::centre_gradients(grid, self.edge, points)
     }
 
-    fn turn(
+    fn make_rings(
         &self,
         grid: &Grid<D>,
         points: &Points<D>,

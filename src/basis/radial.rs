@@ -17,8 +17,8 @@
 //! For `mpm` the domain is a point, and S = S° = N(x_p). A domain that reaches beyond the axis, by what
 //! its update is off, ends at the axis.
 
-use super::gimp::{self, spans};
 use super::contract::Basis;
+use super::gimp::{self, spans};
 use super::product::{Line, for_each_index};
 use super::{Influences, lattice_of, outside};
 use crate::error::{Error, Result};
@@ -38,7 +38,7 @@ pub fn turn<const D: usize>(
     if !influences.centre_gradients.is_empty() {
         influences.centre_hoop = vec![0.0; influences.nodes.len()];
     }
-    basis.turn(grid, points, influences)
+    basis.make_rings(grid, points, influences)
 }
 
 pub(super) fn turn_points<const D: usize>(

@@ -39,23 +39,23 @@ pub struct Incomplete {
     inverse_diagonal: Vec<f64>,
 }
 
-/// A rank tells of a row of L first its diagonal, then the entries beyond the inner nodes.
+/// What a rank sends of a row of L: first its diagonal, then the entries beyond the inner nodes.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
-struct Told {
-    /// Of the column; [`Told::ROW`] where a row begins.
+struct FactorEntry {
+    /// Of the column; [`FactorEntry::ROW`] where a row begins.
     node: u64,
     /// Entry of L; one over its diagonal where a row begins.
     value: f64,
 }
 
-impl Told {
+impl FactorEntry {
     const ROW: u64 = u64::MAX;
 }
 
 /// Ranks take their turns on the border in the order of their reversed bits: neighbours mostly
 /// have neighbouring numbers, and so half of all ranks wait for nobody.
-fn turn(rank: usize) -> u32 {
+fn border_order(rank: usize) -> u32 {
     (rank as u32).reverse_bits()
 }
 
@@ -70,14 +70,14 @@ impl Incomplete {
         pattern: &Pattern,
         diagonal: &[f64],
     ) -> Self {
-        let mut factor = Incomplete::plan(turn(world.rank()), order, numbering, pattern);
+        let mut factor = Incomplete::plan(border_order(world.rank()), order, numbering, pattern);
         let places = factor.places(numbering);
         let mut spread = vec![0.0; numbering.len()];
         let (inner, all) = (factor.inner, factor.order.len());
         factor.make(0..inner, matrix, pattern, diagonal, &places, &mut spread);
-        factor.hear(world, numbering);
+        factor.receive_ghost_rows(world, numbering);
         factor.make(inner..all, matrix, pattern, diagonal, &places, &mut spread);
-        factor.tell(world, numbering, &places);
+        factor.send_copied_rows(world, numbering, &places);
         factor
     }
 
@@ -140,8 +140,8 @@ impl Incomplete {
     fn places(&self, numbering: &Numbering) -> Vec<u32> {
         let mut places = vec![u32::MAX; numbering.len()];
         let mut earlier: Vec<(usize, Range<usize>)> =
-            numbering.halo.ghosts().filter(|(rank, _)| turn(*rank) < self.here).collect();
-        earlier.sort_unstable_by_key(|(rank, _)| turn(*rank));
+            numbering.halo.ghosts().filter(|(rank, _)| border_order(*rank) < self.here).collect();
+        earlier.sort_unstable_by_key(|(rank, _)| border_order(*rank));
         let ghosts = earlier.into_iter().flat_map(|(_, ghosts)| ghosts.map(|ghost| ghost as u32));
         let (inner, border) = self.order.split_at(self.inner);
         let sequence = inner.iter().copied().chain(ghosts).chain(border.iter().copied());
@@ -174,14 +174,16 @@ impl Incomplete {
     }
 
     /// Waits for the rows of ghosts that come before the border of this rank.
-    fn hear(&mut self, world: &World, numbering: &Numbering) {
-        for (rank, ghosts) in numbering.halo.ghosts().filter(|(rank, _)| turn(*rank) < self.here) {
-            let mut told = receive_list::<Told>(world, rank).into_iter().peekable();
+    fn receive_ghost_rows(&mut self, world: &World, numbering: &Numbering) {
+        for (rank, ghosts) in
+            numbering.halo.ghosts().filter(|(rank, _)| border_order(*rank) < self.here)
+        {
+            let mut entries = receive_list::<FactorEntry>(world, rank).into_iter().peekable();
             for ghost in ghosts {
-                let Some(start) = told.next() else { break };
+                let Some(start) = entries.next() else { break };
                 self.inverse_diagonal[ghost] = start.value;
                 let begin = self.columns.len() as u32;
-                while let Some(entry) = told.next_if(|entry| entry.node != Told::ROW) {
+                while let Some(entry) = entries.next_if(|entry| entry.node != FactorEntry::ROW) {
                     if let Some(column) = numbering.local(entry.node as usize) {
                         self.columns.push(column as u32);
                         self.values.push(entry.value);
@@ -193,22 +195,27 @@ impl Incomplete {
     }
 
     /// Sends the rows of copied nodes to the ranks whose border comes later.
-    fn tell(&self, world: &World, numbering: &Numbering, places: &[u32]) {
+    fn send_copied_rows(&self, world: &World, numbering: &Numbering, places: &[u32]) {
         let mut lists = Vec::new();
-        for (rank, copied) in numbering.halo.copies().filter(|(rank, _)| turn(*rank) > self.here) {
-            let mut told = Vec::new();
+        for (rank, copied) in
+            numbering.halo.copies().filter(|(rank, _)| border_order(*rank) > self.here)
+        {
+            let mut entries = Vec::new();
             for &node in copied {
-                told.push(Told { node: Told::ROW, value: self.inverse_diagonal[node as usize] });
+                entries.push(FactorEntry {
+                    node: FactorEntry::ROW,
+                    value: self.inverse_diagonal[node as usize],
+                });
                 for entry in self.row(node as usize) {
                     let column = self.columns[entry] as usize;
                     // Inner nodes meet no node of the other rank.
                     if places[column] as usize >= self.inner {
                         let node = numbering.nodes[column] as u64;
-                        told.push(Told { node, value: self.values[entry] });
+                        entries.push(FactorEntry { node, value: self.values[entry] });
                     }
                 }
             }
-            lists.push((rank, told));
+            lists.push((rank, entries));
         }
         send_lists(world, &lists);
     }
@@ -231,8 +238,8 @@ impl Incomplete {
     ) -> Result<()> {
         let (inner, border) = self.order.split_at(self.inner);
         let owned = self.order.len();
-        let before = |rank: usize| turn(rank) < self.here;
-        let after = |rank: usize| turn(rank) > self.here;
+        let before = |rank: usize| border_order(rank) < self.here;
+        let after = |rank: usize| border_order(rank) > self.here;
         let nobody = |_: usize| false;
         let halo = &numbering.halo;
         self.forward(inner, r, z);

@@ -17,7 +17,7 @@ use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations}
 use mpm_par::analysis::solver::{self, Linear, Shape};
 use mpm_par::basis::contract::{self, Basis};
 use mpm_par::deck;
-use mpm_par::deck::model::{self, AnalysisType, BodySide, Frame, GimpEdge, InvertedIterates};
+use mpm_par::deck::model::{self, AnalysisType, Frame, GimpEdge, InvertedIterates};
 use mpm_par::grid::{Grid, Lattice};
 use mpm_par::loads::{self, Load, Moment};
 use mpm_par::material::Model as _;
@@ -124,14 +124,12 @@ fn block(world: &World) -> (Model<2>, Points<2>) {
     setup::prepare(world, deck).expect("a sound problem")
 }
 
-/// The left side or the bottom.
-fn side(axis: usize) -> BodySide {
-    BodySide { body: 0, axis, upper: false, at: 0.0, area: [3.0, 2.0][axis] }
-}
+/// Lengths of the left side and of the bottom, m.
+const LENGTHS: [f64; 2] = [3.0, 2.0];
 
-/// Initial volume of the points at a side, over all ranks, m2.
-fn volume_at(world: &World, side: &BodySide, points: &Points<2>) -> f64 {
-    let carried = (0..points.len()).filter(|&p| loads::traction::carries(side, points, p));
+/// Initial volume of the points at the left side or the bottom, over all ranks, m2.
+fn volume_at(world: &World, axis: usize, points: &Points<2>) -> f64 {
+    let carried = (0..points.len()).filter(|&p| wind::carries(axis, 0.0, points, p));
     world.sum(carried.map(|p| points.volume_initial[p]).sum())
 }
 
@@ -164,11 +162,10 @@ fn rest_on_springs(world: &World, basis: &dyn Basis<2>) {
     external.truncate(numbering.owned * 2);
 
     const SUBGRADE: f64 = 2e6;
-    let bottom = side(1);
-    let volume = volume_at(world, &bottom, &points);
+    let volume = volume_at(world, 1, &points);
     let springs: Vec<f64> = (0..points.len())
-        .map(|p| match loads::traction::carries(&bottom, &points, p) {
-            true => SUBGRADE * bottom.area * points.volume_initial[p] / volume,
+        .map(|p| match wind::carries(1, 0.0, &points, p) {
+            true => SUBGRADE * LENGTHS[1] * points.volume_initial[p] / volume,
             false => 0.0,
         })
         .collect();
@@ -313,9 +310,16 @@ fn blow(universe: &Universe) {
     let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
     let world = World::new(universe.world().duplicate());
     let (model, points) = block(&world);
-    let side = side(0);
-    let volume = volume_at(&world, &side, &points);
-    let wind = Wind { side, volume, density: 1.25, speed: 25.0, exponent: 0.5, coefficient: 0.8 };
+    let volume = volume_at(&world, 0, &points);
+    let wind = Wind {
+        side: 0.0,
+        area: LENGTHS[0],
+        volume,
+        density: 1.25,
+        speed: 25.0,
+        exponent: 0.5,
+        coefficient: 0.8,
+    };
     let all: Vec<Box<dyn Load<2>>> = vec![Box::new(wind)];
     let at = Moment::new(AnalysisType::QuasiStatic, 0.5, 0.5);
     let forces = loads::on_points(&points, &model.materials, &all, at).expect("forces");

@@ -2,9 +2,7 @@
 //! a power-law profile (EN 1991-1-4 has its own profile; this one is common in ASCE 7) on a side of
 //! a body, carried by its outermost layer of points.
 
-use mpm_par::deck::model::BodySide;
 use mpm_par::error::Result;
-use mpm_par::loads::traction::carries;
 use mpm_par::loads::{Load, Moment};
 use mpm_par::material::Material;
 use mpm_par::points::Points;
@@ -12,9 +10,15 @@ use mpm_par::points::Points;
 /// Height that the speed belongs to, m.
 const REFERENCE: f64 = 10.0;
 
-/// Wind on a side of a body.
+/// A point belongs to the layer if its domain ends at the side, to this share of its half length.
+const SLACK: f64 = 1e-6;
+
+/// Wind along the axis x on a plane side of a body.
 pub struct Wind {
-    pub side: BodySide,
+    /// The windward side, m; the body lies beyond it.
+    pub side: f64,
+    /// m2 (m in 2D)
+    pub area: f64,
     /// Initial volume of the points that carry the side, over all ranks, m3.
     pub volume: f64,
     /// rho, kg/m3
@@ -27,6 +31,12 @@ pub struct Wind {
     pub coefficient: f64,
 }
 
+/// Whether point `p` is in the outermost layer at a side across `axis`. It depends on the start alone.
+pub fn carries<const D: usize>(axis: usize, side: f64, points: &Points<D>, p: usize) -> bool {
+    let (x, half) = (points.position_initial[p][axis], points.half_length_initial[p][axis]);
+    x - (1.0 + SLACK) * half <= side
+}
+
 impl<const D: usize> Load<D> for Wind {
     fn add_to_points(
         &self,
@@ -35,17 +45,15 @@ impl<const D: usize> Load<D> for Wind {
         at: Moment,
         forces: &mut [[f64; D]],
     ) -> Result<()> {
-        // A pressure pushes into the body.
-        let sign = if self.side.upper { -1.0 } else { 1.0 };
         for (p, force) in forces.iter_mut().enumerate() {
-            if !carries(&self.side, points, p) {
+            if !carries(0, self.side, points, p) {
                 continue;
             }
             let height = points.position_initial[p][1].max(0.0);
             let speed = self.speed * (height / REFERENCE).powf(self.exponent);
             let pressure = self.coefficient * 0.5 * self.density * speed * speed;
-            let area = self.side.area * points.volume_initial[p] / self.volume;
-            force[self.side.axis] += sign * at.ramp * pressure * area;
+            let area = self.area * points.volume_initial[p] / self.volume;
+            force[0] += at.ramp * pressure * area;
         }
         Ok(())
     }
