@@ -1,7 +1,12 @@
 //! Operators and functions of formulas on plain numbers.
 
+/// A name and what it computes from one number.
+type Function = (&'static str, fn(f64) -> f64);
+/// A name and what it computes from two numbers.
+type Binary = (&'static str, fn(f64, f64) -> f64);
+
 /// Functions of one argument. `log` is the natural logarithm, as `ln`.
-pub const FUNCTIONS: [(&str, fn(f64) -> f64); 24] = [
+pub const FUNCTIONS: [Function; 24] = [
     ("abs", f64::abs),
     ("acos", f64::acos),
     ("acosh", f64::acosh),
@@ -29,7 +34,7 @@ pub const FUNCTIONS: [(&str, fn(f64) -> f64); 24] = [
 ];
 
 /// Operators of two arguments, and functions of two; `min` and `max` take any number.
-pub const BINARY: [(&str, fn(f64, f64) -> f64); 16] = [
+pub const BINARY: [Binary; 16] = [
     ("+", |a, b| a + b),
     ("-", |a, b| a - b),
     ("*", |a, b| a * b),
