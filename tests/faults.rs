@@ -54,7 +54,7 @@ fn decks_that_cannot_be_read() {
         2,
         "error: --set analysis.stepz=3: analysis.stepz: unknown key \"stepz\"
    = did you mean \"steps\"?
-   = known keys of [analysis]: type, steps, duration, cfl, tolerance, max_iterations, on_failure, \
+   = known keys of [analysis]: type, symmetry, steps, duration, cfl, tolerance, max_iterations, on_failure, \
 smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha",
     );
     refused(
@@ -531,7 +531,7 @@ fn results_that_are_in_the_way() {
                  DIR to write elsewhere, or --restart last to continue\n    --force replaces: \
                  domains.xdmf, grid-000001.h5, grid-000002.h5, grid.xdmf, history.csv, log.txt, \
                  points-000000.h5 to points-000002.h5 (3 files), points.xdmf, \
-                 residuals.csv, resolved.toml, summary.json",
+                 report.html, residuals.csv, resolved.toml, summary.json",
                 // The copy of the deck is that of this run already.
                 before.len() - 1
             )

@@ -29,7 +29,7 @@ pub fn list() -> String {
         let width = rows.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
         out.push_str(&format!("{title}\n"));
         for (name, text) in rows {
-            out.push_str(format!("  {name:width$}  {text}").trim_end());
+            out.push_str(format!("  {name:width$}  {}", cut(&text)).trim_end());
             out.push('\n');
         }
         out.push('\n');
@@ -66,6 +66,17 @@ pub fn list() -> String {
     part("templates (--new NAME)", pairs(&templates));
     out.push_str("More on any of these words and on every key: mpm-par --explain WORD");
     out
+}
+
+/// What fits into a line; the rest is told by `--explain`.
+fn cut(text: &str) -> String {
+    const MOST: usize = 110;
+    if text.chars().count() <= MOST {
+        return text.to_string();
+    }
+    let short: String = text.chars().take(MOST).collect();
+    let end = short.rfind(' ').unwrap_or(short.len());
+    format!("{} ...", short[..end].trim_end_matches([',', ';', ':']))
 }
 
 fn first_sentence(text: &str) -> &str {

@@ -134,8 +134,11 @@ impl Drawing for Curves {
             .bold_line_style(BLACK.mix(0.15))
             .x_desc(&self.x.0)
             .y_desc(title)
-            .x_label_formatter(&|x| tick(*x))
-            .y_label_formatter(&|y| if logarithmic { tick(10f64.powf(*y)) } else { tick(*y) })
+            .x_label_formatter(&|value| tick(*value, x.1 - x.0))
+            .y_label_formatter(&|value| match logarithmic {
+                true => tick(10f64.powf(*value), 0.0),
+                false => tick(*value, y.1 - y.0),
+            })
             .label_style(("sans-serif", LETTERS - 4))
             .axis_desc_style(("sans-serif", LETTERS - 2))
             .draw()

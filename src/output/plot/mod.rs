@@ -85,10 +85,10 @@ fn encoded(pixels: &[u8], width: u32, height: u32) -> std::result::Result<Vec<u8
     Ok(bytes)
 }
 
-/// Shortest text of a tick: `0`, `1.5`, `-2e6`.
-fn tick(value: f64) -> String {
+/// Shortest text of a tick of an axis of this length: `0`, `1.5`, `-2e6`.
+fn tick(value: f64, length: f64) -> String {
     let size = value.abs();
-    if size < 1e-300 {
+    if size <= 1e-9 * length {
         "0".into()
     } else if (1e-3..1e5).contains(&size) {
         // Sums of steps have a last digit of round-off.
@@ -107,7 +107,7 @@ mod tests {
 
     #[test]
     fn ticks_are_short() {
-        let texts = [0.0, 1.5, 0.1 + 0.2, -2e6, 12345.0, 1e-4].map(tick);
-        assert_eq!(texts, ["0", "1.5", "0.3", "-2e6", "12345", "1e-4"]);
+        let texts = [0.0, 1.5, 0.1 + 0.2, -2e6, 12345.0, 1e-4, 7e-18].map(|x| tick(x, 0.1));
+        assert_eq!(texts, ["0", "1.5", "0.3", "-2e6", "12345", "1e-4", "0"]);
     }
 }

@@ -153,8 +153,8 @@ impl Drawing for Scene<'_> {
                 .disable_mesh()
                 .x_desc("x [m]")
                 .y_desc("y [m]")
-                .x_label_formatter(&|x| tick(*x))
-                .y_label_formatter(&|y| tick(*y))
+                .x_label_formatter(&|x| tick(*x, reach.0))
+                .y_label_formatter(&|y| tick(*y, reach.1))
                 .label_style(("sans-serif", LETTERS - 4))
                 .axis_desc_style(("sans-serif", LETTERS - 3))
                 .draw()
@@ -203,7 +203,7 @@ impl Scene<'_> {
             let y = top + tall * k / 4;
             area.draw(&PathElement::new(vec![(26, y), (32, y)], BLACK))?;
             area.draw(&Text::new(
-                tick(rounded(value, high - low)),
+                tick(rounded(value, high - low), high - low),
                 (36, y - 8),
                 style(LETTERS - 4),
             ))?;

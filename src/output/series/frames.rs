@@ -18,7 +18,10 @@ use crate::output::whole_file::cannot_read;
 const MOST_NUMBERS: usize = 4_500_000;
 const MOST_FRAMES: usize = 60;
 /// Points of all frames together: what may be read.
-const MOST_ROWS: usize = 40_000_000;
+const MOST_ROWS: usize = 20_000_000;
+/// Of more rows than this they are read in groups: a read of its own for each would take hours.
+const MANY: usize = 20_000_000;
+const TOGETHER: usize = 4096;
 const MOST_COLUMNS: usize = 24;
 
 /// One number at each point.
@@ -159,19 +162,34 @@ fn rows(file: &hdf5::File, name: &str) -> hdf5::Result<usize> {
     Ok(file.dataset(name)?.shape().first().copied().unwrap_or(0))
 }
 
-/// Every `stride`-th row of a dataset, and its number of columns.
+/// One row in `stride` of a dataset, and its number of columns.
 fn table(file: &hdf5::File, name: &str, stride: usize) -> hdf5::Result<(Vec<f64>, usize)> {
+    let together = if rows(file, name)? > MANY { TOGETHER } else { 1 };
+    rows_together(file, name, stride, together)
+}
+
+/// The same, with so many rows together and a gap behind them.
+fn rows_together(
+    file: &hdf5::File,
+    name: &str,
+    stride: usize,
+    together: usize,
+) -> hdf5::Result<(Vec<f64>, usize)> {
     let dataset = file.dataset(name)?;
     let shape = dataset.shape();
     let total = shape.first().copied().unwrap_or(0);
     let columns = shape.get(1).copied().unwrap_or(1);
-    let part = |start, step, count| SliceOrIndex::SliceCount { start, step, count, block: 1 };
-    let mut slices = vec![part(0, stride, total.div_ceil(stride))];
     if stride == 1 || total == 0 {
         return Ok((dataset.read_raw()?, columns));
     }
+    let part = |step, count, block| SliceOrIndex::SliceCount { start: 0, step, count, block };
+    let count = match together {
+        1 => total.div_ceil(stride),
+        _ => (total / (stride * together)).max(1),
+    };
+    let mut slices = vec![part(stride * together, count, together)];
     let values: Vec<f64> = if shape.len() > 1 {
-        slices.push(part(0, 1, columns));
+        slices.push(part(1, columns, 1));
         dataset.read_slice_2d::<f64, _>(Hyperslab::from(slices))?.into_iter().collect()
     } else {
         dataset.read_slice_1d::<f64, _>(Hyperslab::from(slices))?.into_iter().collect()
@@ -278,6 +296,30 @@ fn sample(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn rows_are_read_one_by_one_or_in_groups() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = hdf5::File::create(folder.path().join("points.h5")).unwrap();
+        let numbers: Vec<f64> = (0..60).map(f64::from).collect();
+        file.new_dataset::<f64>()
+            .shape((20, 3))
+            .create("wide")
+            .unwrap()
+            .write_raw(&numbers)
+            .unwrap();
+        file.new_dataset::<f64>().shape(60).create("thin").unwrap().write_raw(&numbers).unwrap();
+        let read = |name, stride, together| rows_together(&file, name, stride, together).unwrap();
+        assert_eq!(read("thin", 23, 1).0, [0.0, 23.0, 46.0]);
+        assert_eq!(
+            read("thin", 5, 4).0,
+            [0.0, 1.0, 2.0, 3.0, 20.0, 21.0, 22.0, 23.0, 40.0, 41.0, 42.0, 43.0]
+        );
+        assert_eq!(read("thin", 31, 2).0, [0.0, 1.0]);
+        let wide = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 30.0, 31.0, 32.0, 33.0, 34.0, 35.0];
+        assert_eq!(read("wide", 5, 2), (wide.to_vec(), 3));
+        assert_eq!(read("wide", 1, 2).0, numbers);
+    }
 
     #[test]
     fn strides_are_prime() {
