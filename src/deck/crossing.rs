@@ -51,6 +51,7 @@ impl Shape {
                     p = q;
                 }
             }
+            Form::Solid(solid) => solid.crossings(&a, &d, out),
             Form::Where(condition) => {
                 let holds = |t: f64| {
                     let x = std::array::from_fn(|i| a[i] + t * d[i]);
@@ -105,6 +106,11 @@ impl Shape {
                 around(to, &|_| *radius);
             }
             Form::Polygon { vertices } => out.extend(vertices.iter().map(|v| padded(v))),
+            Form::Solid(solid) => {
+                // Those of its box: each corner of a fine surface would be too many.
+                let (low, high) = solid.bounds();
+                out.extend([low, high]);
+            }
             Form::Where(_) => {}
             Form::Union(parts) | Form::Intersection(parts) | Form::Difference(parts) => {
                 parts.iter().for_each(|part| part.corners(out));
@@ -159,6 +165,7 @@ impl Shape {
                 let sign = if self.form_contains(x) { -1.0 } else { 1.0 };
                 by(sign * nearest.sqrt(), radius)
             }
+            Form::Solid(solid) => solid.side(&x, &half),
             Form::Where(_) => {
                 let dimension = if half[2] > 0.0 { 3 } else { 2 };
                 let across = SAMPLES / 4 + 1;

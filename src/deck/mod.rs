@@ -17,6 +17,7 @@
 //! | `list.rs`, `explain.rs` | `--list`, `--explain` |
 //! | `templates.rs`, `templates/` | `--new`: decks to start from |
 //! | `expression/`, `shape.rs` | formulas; regions of space |
+//! | `solid/` | regions bounded by triangles: STL files, terrain |
 //! | `crossing.rs` | where lines and boxes meet the boundary of a region |
 
 mod crossing;
@@ -36,6 +37,7 @@ mod resolved;
 pub mod schema;
 mod sections;
 pub mod shape;
+pub mod solid;
 pub mod templates;
 mod tree;
 mod unread;

@@ -516,6 +516,14 @@ pub struct Support {
     pub slip: bool,
     /// Force per area and per distance, times h over the body's stiffness.
     pub penalty: f64,
+    pub method: SupportMethod,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SupportMethod {
+    Penalty,
+    /// The material's own traction, and a penalty for what is left.
+    Nitsche,
 }
 
 /// What a [`Support`] holds.

@@ -52,8 +52,10 @@ pub fn physics(deck: &Deck) -> String {
         name_only(path);
     }
     for body in &mut deck.bodies {
-        if let BodySource::File(path) = &mut body.source {
-            name_only(path);
+        match &mut body.source {
+            BodySource::File(path) => name_only(path),
+            BodySource::Shape { shape, .. } => shape.rename_files(&name_only),
+            BodySource::MeshCells { .. } => {}
         }
     }
     // Without Ghost there is no [ghost]; checkpoints of earlier versions say no more than that.

@@ -315,6 +315,13 @@ fn shape(region: &Shape) -> String {
         Form::Polygon { vertices } => {
             ("polygon", inline(&[("vertices", array(vertices.iter().map(|v| vector(v))))]))
         }
+        Form::Solid(solid) => {
+            let path = quote(&solid.path.display().to_string());
+            match solid.bottom {
+                None => ("stl", path),
+                Some(bottom) => ("terrain", inline(&[("file", path), ("bottom", number(bottom))])),
+            }
+        }
         Form::Where(condition) => ("where", quote(condition.text())),
         Form::Union(parts) => ("union", set(parts)),
         Form::Intersection(parts) => ("intersection", set(parts)),
@@ -412,6 +419,7 @@ fn supported(w: &mut Writer<'_>, deck: &Deck, boundary: &Boundary, support: &Sup
     displaced(w, boundary);
     w.line("boundary", "slip", support.slip.to_string());
     w.line("boundary", "penalty", number(support.penalty));
+    w.line("boundary", "method", quote(support.method.name()));
 }
 
 fn displaced(w: &mut Writer<'_>, boundary: &Boundary) {

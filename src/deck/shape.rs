@@ -7,10 +7,15 @@
 //! | `ellipse`, `ellipsoid` | [`Form::Ellipsoid`] | sum ((x - c) / a)^2 <= 1 |
 //! | `capsule` | [`Form::Capsule`] | distance to the segment <= radius |
 //! | `polygon` | [`Form::Polygon`] | even-odd rule, edges belong to it (2D) |
+//! | `stl`, `terrain` | [`Form::Solid`] | winding number of its triangles (3D) |
 //! | `where` | [`Form::Where`] | the formula is not zero |
 //! | `union`, `intersection`, `difference` | the same | of the listed shapes; first minus the rest |
 
+use std::path::PathBuf;
+use std::sync::Arc;
+
 use super::expression::{Expression, Scope};
+use super::solid::Solid;
 
 /// A region of space: a form in its own frame, and where that frame lies.
 /// `x` slices have the problem's dimension (2 or 3).
@@ -28,6 +33,7 @@ pub enum Form {
     Ellipsoid { centre: Vec<f64>, semi_axes: Vec<f64> },
     Capsule { from: Vec<f64>, to: Vec<f64>, radius: f64 },
     Polygon { vertices: Vec<[f64; 2]> },
+    Solid(Arc<Solid>),
     Where(Expression),
     Union(Vec<Shape>),
     Intersection(Vec<Shape>),
@@ -110,6 +116,23 @@ impl Shape {
         Shape { form, placement: Placement::default() }
     }
 
+    /// Renames the files that its forms came from.
+    pub fn rename_files(&mut self, rename: &impl Fn(&mut PathBuf)) {
+        match &mut self.form {
+            Form::Solid(solid) => {
+                let mut path = solid.path.clone();
+                rename(&mut path);
+                if path != solid.path {
+                    *solid = Arc::new(solid.renamed(path));
+                }
+            }
+            Form::Union(parts) | Form::Intersection(parts) | Form::Difference(parts) => {
+                parts.iter_mut().for_each(|part| part.rename_files(rename));
+            }
+            _ => {}
+        }
+    }
+
     /// True inside or on the boundary.
     pub fn contains(&self, x: &[f64]) -> bool {
         self.contains_padded(padded(x))
@@ -163,7 +186,8 @@ impl Shape {
 }
 
 impl Form {
-    fn contains(&self, x: [f64; 3]) -> bool {
+    /// As [`Shape::contains_padded`], in the form's own frame.
+    pub fn contains(&self, x: [f64; 3]) -> bool {
         match self {
             Form::Box { min, max } => {
                 min.iter().zip(max).zip(&x).all(|((low, high), x)| low <= x && x <= high)
@@ -179,6 +203,7 @@ impl Form {
                 distance_to_segment_squared(&x, from, to) <= radius * radius
             }
             Form::Polygon { vertices } => polygon_contains(vertices, x[0], x[1]),
+            Form::Solid(solid) => solid.contains(&x),
             Form::Where(condition) => {
                 let value = condition.value(&Scope { initial: x, current: x, ..Scope::default() });
                 value != 0.0 && !value.is_nan()
@@ -211,6 +236,10 @@ impl Form {
                 .iter()
                 .map(|v| (v.to_vec(), v.to_vec()))
                 .reduce(|bounds, vertex| joined(bounds, &vertex)),
+            Form::Solid(solid) => {
+                let (low, high) = solid.bounds();
+                Some((low.to_vec(), high.to_vec()))
+            }
             Form::Where(_) => None,
             Form::Union(shapes) => {
                 let all: Option<Vec<Bounds>> = shapes.iter().map(Shape::bounds).collect();

@@ -3,7 +3,7 @@
 use super::model::{
     AffineTransfer, AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Format, Frame,
     GhostScaling, GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume,
-    PositionUpdate, StressUpdate, Symmetry, Tangent, VerifyNorm,
+    PositionUpdate, StressUpdate, SupportMethod, Symmetry, Tangent, VerifyNorm,
 };
 
 /// An enumeration that the deck spells in words.
@@ -73,6 +73,7 @@ words! {
     Element { "quad4" => Quad4, "tri3" => Tri3, "hex8" => Hex8, "tet4" => Tet4 }
     Initial { "balanced" => Balanced, "slabs" => Slabs }
     Cost { "points" => Points, "time" => Time }
+    SupportMethod { "penalty" => Penalty, "nitsche" => Nitsche }
     Format { "xdmf" => Xdmf, "vtkhdf" => VtkHdf, "vtu" => Vtu }
     VerifyNorm { "volume-l1" => VolumeL1, "volume-l2" => VolumeL2, "max" => Max }
 }

@@ -117,7 +117,10 @@ fn model_of<const D: usize>(
     let loads = loads::of_deck(&deck.loads, found, grid.cell_size())?;
     let supports = surfaces::supports(world, &deck, points, grid.cell_size())?;
     let contacts = Arc::new(Contacts::of_deck(&deck, &stiffness, grid.cell_size())?);
-    let symmetric = symmetric && contacts.symmetric() && loads.iter().all(|load| load.symmetric());
+    let symmetric = symmetric
+        && contacts.symmetric()
+        && loads.iter().all(|load| load.symmetric())
+        && !supports.iter().any(|support| support.nitsche);
     let balance = Balance::default();
     Ok(Model {
         deck,

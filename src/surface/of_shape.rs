@@ -87,7 +87,7 @@ impl Leaf<'_> {
 
     fn contains(&self, x: [f64; 3]) -> bool {
         let local = self.frames.iter().rev().fold(x, |x, frame| frame.localise(x));
-        Shape::new(self.form.clone()).contains_padded(local)
+        self.form.contains(local)
     }
 }
 
@@ -148,7 +148,8 @@ fn cut<const D: usize>(
             continue;
         }
         // Of an element that is kept as a whole, its middle lies on the surface itself.
-        let centre = match kept == looks[0] * looks[1] {
+        let whole = kept == looks[0] * looks[1] && !piece.is_flat();
+        let centre = match whole {
             true => {
                 let at = |k: usize| (first[k] as f64 + 0.5) / counts[k] as f64;
                 leaf.to_global(piece.at(at(0), at(1)).0)

@@ -10,6 +10,8 @@ type Vector = [f64; 3];
 pub enum Piece {
     /// corner + s u + t v; in 2D v is the unit vector along z and t does not matter.
     Flat { corner: Vector, u: Vector, v: Vector },
+    /// corner + s ((1 - t) u + t v) (3D).
+    Triangle { corner: Vector, u: Vector, v: Vector },
     /// centre + a cos(w) e_x + b sin(w) e_y for w from `from` over `turn`, radians (2D).
     Arc { centre: Vector, semi: [f64; 2], from: f64, turn: f64 },
     /// centre + semi_i n_i, n on the unit sphere, `height` a range of n·pole (3D).
@@ -23,6 +25,7 @@ impl Piece {
     pub fn extent(&self) -> [f64; 2] {
         match self {
             Piece::Flat { u, v, .. } => [norm(u), norm(v)],
+            Piece::Triangle { u, v, .. } => [norm(u).max(norm(v)), norm(&minus(v, u))],
             Piece::Arc { semi, turn, .. } => [semi[0].max(semi[1]) * turn.abs(), 1.0],
             Piece::Dome { semi, height, .. } => {
                 let largest = semi.iter().copied().fold(0.0, f64::max);
@@ -32,11 +35,16 @@ impl Piece {
         }
     }
 
+    /// Whether a mean of its places lies on it.
+    pub fn is_flat(&self) -> bool {
+        matches!(self, Piece::Flat { .. } | Piece::Triangle { .. })
+    }
+
     /// Numbers of cuts along s and t are multiples of these: pieces that are round are cut at their
     /// quadrants.
     pub fn folds(&self) -> [usize; 2] {
         match self {
-            Piece::Flat { .. } => [1, 1],
+            Piece::Flat { .. } | Piece::Triangle { .. } => [1, 1],
             Piece::Arc { turn, .. } => [((4.0 * turn.abs() / TAU).round() as usize).max(1), 1],
             Piece::Dome { .. } => [4, 2],
             Piece::Tube { .. } => [4, 1],
@@ -48,6 +56,10 @@ impl Piece {
         match self {
             Piece::Flat { corner, u, v } => {
                 (std::array::from_fn(|i| corner[i] + s * u[i] + t * v[i]), cross(u, v))
+            }
+            Piece::Triangle { corner, u, v } => {
+                let place = std::array::from_fn(|i| corner[i] + s * ((1.0 - t) * u[i] + t * v[i]));
+                (place, cross(u, v).map(|a| s * a))
             }
             Piece::Arc { centre, semi, from, turn } => {
                 let (sin, cos) = (from + s * turn).sin_cos();
@@ -96,6 +108,14 @@ pub fn of_form(form: &Form, dimension: usize) -> Vec<Piece> {
                 .zip(next)
                 .map(|(a, b)| segment([a[0], a[1], 0.0], [b[0], b[1], 0.0]))
                 .collect()
+        }
+        Form::Solid(solid) => {
+            let of_triangle = |[p, q, r]: &[Vector; 3]| Piece::Triangle {
+                corner: *p,
+                u: minus(q, p),
+                v: minus(r, p),
+            };
+            solid.triangles.iter().map(of_triangle).collect()
         }
         Form::Where(_) | Form::Union(_) | Form::Intersection(_) | Form::Difference(_) => Vec::new(),
     }

@@ -4,7 +4,7 @@
 
 use crate::deck::Scope;
 use crate::deck::expression::Expression;
-use crate::deck::model::Boundary;
+use crate::deck::model::{Boundary, SupportMethod};
 use crate::loads::Moment;
 use crate::surface::sheet::Sheet;
 use crate::surface::{Element, Surface, norm};
@@ -25,6 +25,9 @@ pub struct Support<const D: usize> {
     hold: Hold<D>,
     /// β over the stiffness of the body, 1/m.
     pub penalty: f64,
+    /// The material's own traction acts besides (Nitsche's method), so that the penalty bears what is
+    /// left of it.
+    pub nitsche: bool,
     displacement: Vec<(usize, Expression)>,
     /// What lies beyond it is free.
     pub within: Option<Sheet<D>>,
@@ -48,6 +51,7 @@ impl<const D: usize> Support<D> {
             surface,
             hold,
             penalty: support.penalty / cell,
+            nitsche: support.method == SupportMethod::Nitsche,
             displacement: boundary.displacement.clone(),
             within,
         })

@@ -5,6 +5,8 @@ use super::Kind::{
     Table, Text, Vector,
 };
 use super::Need::{Default, Optional, Required};
+use crate::deck::model::SupportMethod;
+
 use super::{AXES, POSITIVE, Section, at_least, between, key};
 
 const SIDE: &str = "The part whose outward normal, in the frame of the shape before rotate, is nearest to this direction: a box's own side, a quarter of a disc.";
@@ -63,6 +65,10 @@ pub const SECTIONS: &[Section] = &[
             key("ellipsoid", Table("shape.ellipsoid"), Optional("-"), "The same as ellipse."),
             key("capsule", Table("shape.capsule"), Optional("-"), "Segment with a round radius."),
             key("polygon", Table("shape.polygon"), Optional("-"), "2D, also non-convex."),
+            key("stl", Text, Optional("-"),
+                "3D: an STL file (text or binary, lengths in m) beside the deck, a closed surface whose facets face outward. A place is inside by its winding number."),
+            key("terrain", Table("shape.terrain"), Optional("-"),
+                "3D: the ground below a grid of heights, z upward."),
             key("where", Text, Optional("-"),
                 "Condition on x, y, z in the shape's frame, such as \"x*x + y < 1\"; bound it with intersection."),
             key("union", Special(SHAPES), Optional("-"), "Points in any of them."),
@@ -107,6 +113,15 @@ pub const SECTIONS: &[Section] = &[
         keys: &[key("vertices", Points, Required, "Corners in order, three or more.").unit("m")],
     },
     Section {
+        name: "shape.terrain",
+        header: "shape.terrain",
+        doc: "The heights are joined by triangles and stand at the middles of the file's cells. Gaps (NODATA) are refused. `translate` brings a place on the map to the grid.",
+        keys: &[
+            key("file", Text, Required, "ESRI ASCII grid (ncols, nrows, xllcorner, yllcorner, cellsize, rows from the north) beside the deck."),
+            key("bottom", Number, Required, "Height of the flat bottom, below all heights.").unit("m"),
+        ],
+    },
+    Section {
         name: "shape.rotate",
         header: "shape.rotate",
         doc: "Right-handed; in 2D counter-clockwise.",
@@ -134,9 +149,12 @@ pub const SECTIONS: &[Section] = &[
             key("slip", Flag, Optional("false; only with surface"),
                 "Holds the component along the normal that the surface has at the start, and lets the material slide along it: exact on a plane. With displacement its normal component is prescribed.")
                 .read_by(&[super::LOADED]),
-            key("penalty", Number, Optional("100; only with surface"),
+            key("penalty", Number, Optional("100, with nitsche 10; only with surface"),
                 "Force per area and per distance times the cell size over the body's stiffness: the surface gives way by p h / (penalty E) under the pressure p. In explicit runs it shortens the stable time step.")
                 .range(POSITIVE).read_by(&[super::LOADED]),
+            key("method", Choice(SupportMethod::NAMES), Optional("\"penalty\"; only with surface"),
+                "nitsche: the material's own stress supplies the traction there, and the penalty bears what is left, so that it can be small: more exact, with an unsymmetric tangent.")
+                .read_by(&[super::IMPLICIT]),
         ],
     },
     Section {

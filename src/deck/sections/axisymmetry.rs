@@ -2,7 +2,8 @@
 //! bases and loads that are not derived for rings.
 
 use crate::deck::model::{
-    AffineTransfer, Basis, BodySource, Deck, GimpEdge, Grid, Load, MeshMotion, Symmetry,
+    AffineTransfer, Basis, BodySource, Deck, GimpEdge, Grid, Load, MeshMotion, Support,
+    SupportMethod, Symmetry,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -50,6 +51,9 @@ pub fn check(root: &Table<'_>, deck: &Deck) -> Got<()> {
             Err(table
                 .problem("rotation", "turns the section, which a body of revolution cannot do"))
         }
+        None if deck.boundaries[index].support().is_some_and(by_nitsche) => {
+            Err(table.problem("method", "\"nitsche\" is not derived for rings; use \"penalty\""))
+        }
         None => Ok(()),
     })?;
     root.tables("load", |index, table| match &deck.loads[index] {
@@ -64,6 +68,10 @@ pub fn check(root: &Table<'_>, deck: &Deck) -> Got<()> {
         return root.table("conditioning", |t| Err(t.problem("displacement", message)));
     }
     Ok(())
+}
+
+fn by_nitsche(support: &Support) -> bool {
+    support.method == SupportMethod::Nitsche
 }
 
 fn method(root: &Table<'_>, deck: &Deck) -> Got<()> {

@@ -143,7 +143,7 @@ fn source(body: &Table<'_>, shape: &Table<'_>, world: &World<'_>) -> Got<BodySou
         let tag = (tag != "all").then_some(tag);
         return Ok(BodySource::MeshCells { tag, seeding: seeding(body, world)? });
     }
-    let form = shapes::shape(shape, world.dimension, 0);
+    let form = shapes::shape(shape, world.directory, world.dimension, 0);
     let seeding = seeding(body, world);
     let form = form?;
     if let (Some((low, high)), Some((min, max))) = (form.bounds(), grid_bounds(world.grid)) {

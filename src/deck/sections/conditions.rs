@@ -5,13 +5,15 @@ use super::{shapes, surfaces};
 use crate::deck::expression::Variable;
 use crate::deck::model::{
     Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone, Rotation, Support,
+    SupportMethod,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, SIDES};
 
-/// Penalty factor where the deck says nothing.
+/// Penalty factors where the deck says nothing.
 const PENALTY: f64 = 100.0;
+const PENALTY_OF_NITSCHE: f64 = 10.0;
 
 /// `bodies`: as written; `read`: as read, if that succeeded.
 pub fn boundaries(
@@ -57,7 +59,8 @@ pub fn boundaries(
             }
             return checked(&table, Boundary { name, place, fix, displacement, rotation });
         }
-        table.refuse(&["slip", "penalty"], "only with surface; nodes are held exactly")?;
+        table
+            .refuse(&["slip", "penalty", "method"], "only with surface; nodes are held exactly")?;
         if fix.is_empty() && displacement.is_empty() && rotation.is_none() {
             let message = "prescribes nothing: expected fix, displacement or rotation";
             return Err(table.problem("", message));
@@ -92,10 +95,16 @@ fn support(
 ) -> Got<Support> {
     let surface = table.table("surface", |t| surfaces::held(&t, world.dimension, bodies, read));
     let (slip, penalty) = (table.flag_if("slip"), table.number_if("penalty"));
+    let method = table.choice_if("method")?.unwrap_or(SupportMethod::Penalty);
+    let usual = match method {
+        SupportMethod::Penalty => PENALTY,
+        SupportMethod::Nitsche => PENALTY_OF_NITSCHE,
+    };
     Ok(Support {
         surface: surface?,
         slip: slip?.unwrap_or(false),
-        penalty: penalty?.unwrap_or(PENALTY),
+        penalty: penalty?.unwrap_or(usual),
+        method,
     })
 }
 

@@ -1,13 +1,19 @@
 //! `body.shape`: forms and where they are put.
 
+use std::path::Path;
+use std::sync::Arc;
+
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema;
 use crate::deck::shape::{Form, Placement, Shape, Turn};
+use crate::deck::solid::terrain::Heights;
+use crate::deck::solid::{Solid, stl};
 use crate::deck::tree::Value;
+use crate::input_file;
 
 /// Keys of the forms; the sources `points` and `cells` are a body's own.
-pub const FORMS: [&str; 11] = [
+pub const FORMS: [&str; 13] = [
     "box",
     "disc",
     "ball",
@@ -15,6 +21,8 @@ pub const FORMS: [&str; 11] = [
     "ellipsoid",
     "capsule",
     "polygon",
+    "stl",
+    "terrain",
     "where",
     "union",
     "intersection",
@@ -24,7 +32,8 @@ pub const FORMS: [&str; 11] = [
 /// Sets of sets deeper than this are refused.
 const DEEPEST: usize = 32;
 
-pub fn shape(table: &Table<'_>, dimension: usize, depth: usize) -> Got<Shape> {
+/// `directory`: where relative paths start.
+pub fn shape(table: &Table<'_>, directory: &Path, dimension: usize, depth: usize) -> Got<Shape> {
     if depth > DEEPEST {
         return Err(table.problem("", format!("shapes are nested more than {DEEPEST} deep")));
     }
@@ -32,12 +41,18 @@ pub fn shape(table: &Table<'_>, dimension: usize, depth: usize) -> Got<Shape> {
         table.refuse(&["points", "cells"], "only directly in a body")?;
     }
     let name = table.one_of(&FORMS)?;
-    let form = form(table, name, dimension, depth);
+    let form = form(table, name, directory, dimension, depth);
     let placement = placement(table, dimension);
     Ok(Shape { form: form?, placement: placement? })
 }
 
-fn form(table: &Table<'_>, name: &'static str, dimension: usize, depth: usize) -> Got<Form> {
+fn form(
+    table: &Table<'_>,
+    name: &'static str,
+    directory: &Path,
+    dimension: usize,
+    depth: usize,
+) -> Got<Form> {
     match name {
         "box" => table.table(name, |t| {
             let (min, max) = corners(&t, dimension, false)?;
@@ -57,6 +72,26 @@ fn form(table: &Table<'_>, name: &'static str, dimension: usize, depth: usize) -
             Ok(Form::Capsule { from: from?, to: to?, radius: radius? })
         }),
         "polygon" => polygon(table, dimension),
+        "stl" | "terrain" if dimension == 2 => {
+            Err(table.problem(name, "bounds a body in 3D; the grid is 2D"))
+        }
+        "stl" => {
+            let path = directory.join(table.text("stl")?);
+            let made = content(&path, input_file::DATA)
+                .and_then(|bytes| stl::read(&bytes))
+                .and_then(|triangles| Solid::new(&path, None, triangles));
+            solid(table, "stl", &path, made)
+        }
+        "terrain" => table.table(name, |t| {
+            let (file, bottom) = (t.text("file"), t.number("bottom"));
+            let (path, bottom) = (directory.join(file?), bottom?);
+            let made = content(&path, input_file::DATA)
+                .and_then(|bytes| String::from_utf8(bytes).map_err(|_| "is not text".into()))
+                .and_then(|text| Heights::read(&text))
+                .and_then(|heights| heights.above(bottom))
+                .and_then(|triangles| Solid::new(&path, Some(bottom), triangles));
+            solid(&t, "file", &path, made)
+        }),
         "where" => {
             let variables = if dimension == 2 { "x y X Y" } else { "x y z X Y Z" };
             let condition = table.formula("where", variables)?;
@@ -68,9 +103,21 @@ fn form(table: &Table<'_>, name: &'static str, dimension: usize, depth: usize) -
                 )),
             }
         }
-        "union" => Ok(Form::Union(shapes(table, name, dimension, depth)?)),
-        "intersection" => Ok(Form::Intersection(shapes(table, name, dimension, depth)?)),
-        _ => Ok(Form::Difference(shapes(table, name, dimension, depth)?)),
+        "union" => Ok(Form::Union(shapes(table, name, directory, dimension, depth)?)),
+        "intersection" => Ok(Form::Intersection(shapes(table, name, directory, dimension, depth)?)),
+        _ => Ok(Form::Difference(shapes(table, name, directory, dimension, depth)?)),
+    }
+}
+
+fn content(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    input_file::read(path, most).map_err(|reason| format!("cannot be read: {reason}"))
+}
+
+/// A solid of a file, or what is wrong with that.
+fn solid(table: &Table<'_>, key: &str, path: &Path, made: Result<Solid, String>) -> Got<Form> {
+    match made {
+        Ok(solid) => Ok(Form::Solid(Arc::new(solid))),
+        Err(why) => Err(table.problem(key, format!("{}: {why}", path.display()))),
     }
 }
 
@@ -112,6 +159,7 @@ fn polygon(table: &Table<'_>, dimension: usize) -> Got<Form> {
 fn shapes(
     table: &Table<'_>,
     name: &'static str,
+    directory: &Path,
     dimension: usize,
     depth: usize,
 ) -> Got<Vec<Shape>> {
@@ -128,7 +176,7 @@ fn shapes(
         .map(|(index, item)| {
             let path = format!("{}.{index}", table.full(name));
             let part = Table::open(table.problems(), schema::section("shape"), &path, item)?;
-            shape(&part, dimension, depth + 1)
+            shape(&part, directory, dimension, depth + 1)
         })
         .collect();
     all.into_iter().collect()

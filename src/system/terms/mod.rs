@@ -7,6 +7,7 @@
 //! | internal force and tangent stiffness of the points | `stress.rs` | Lagrangian eq. 27, 28 |
 //! | pressures by virtual stress | `pressure.rs` | Given et al. 2024 |
 //! | tractions, pressures and supports on surfaces | `surface.rs` | formulations.md B.6 |
+//! | what a point's own stress transmits over an area | `own_traction.rs` | Nitsche's method |
 //! | both of these as external forces that follow the motion | `following.rs` | |
 //! | their dense blocks | `block.rs` | |
 //! | rigid surfaces | `contact.rs` | formulations.md B.5 |
@@ -19,6 +20,7 @@ pub mod contact;
 pub mod following;
 pub mod ghost;
 pub mod inertia;
+mod own_traction;
 pub mod pressure;
 mod scalar;
 pub mod stress;

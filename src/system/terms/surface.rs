@@ -10,8 +10,14 @@
 //! | pressure | -p a, a = det dF dF^-T a_start | w_a [a_i q_k w_b + p (a_i g_bk - g_bi a_k)], q = ∇p, g = ∇S dF^-1 |
 //! | pressure on a ring | as before, a times r_s / r_start | as before, and w_a p a_i δ_k0 w_b / r_s |
 //! | penalty | -β A0 P (x_s - X_s - ū) | β A0 P_ik w_a w_b |
+//! | Nitsche, besides | P T a | -w_a P_im d(T a)_m/du_bk |
+//!
+//! For `gimp`, whose stress is integrated over its domains exactly, what is spread over a surface goes to
+//! the nodes by the grid's own functions at the element instead, where the carrier reaches their nodes.
 
 use crate::deck::expression::Expression;
+use crate::deck::model::Basis;
+use crate::grid::Grid;
 use crate::loads::pressure::{Pressure, PressureAt};
 use crate::loads::{Moment, OnSurface};
 use crate::points::Points;
@@ -23,6 +29,7 @@ use crate::system::supports::Support;
 use crate::tensor::dense;
 
 use super::block::add_block;
+use super::own_traction;
 use super::stress::{StepPoints, displacement_gradient};
 use super::term::{At, Part};
 
@@ -56,6 +63,9 @@ enum Kind<'a, const D: usize> {
     /// With β, Pa/m.
     Held(&'a Support<D>, f64),
 }
+
+/// Weights up to this are those of round-off.
+const NO_WEIGHT: f64 = 1e-12;
 
 /// What a support bears, this rank's share: force, sum of magnitudes, torque about z through the
 /// origin, and volume of the points that carry it.
@@ -105,7 +115,12 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                         (surface, Kind::Pressure(pressure))
                     }
                 };
-                surface.carried_by(id).iter().for_each(|own| term.push(step, p, own, kind));
+                for own in surface.carried_by(id) {
+                    term.push(step, p, own, kind);
+                    if model.deck.method.basis == Basis::Gimp && step.influences.hoop.is_empty() {
+                        term.weigh_by_grid(&model.grid, step);
+                    }
+                }
             }
             for support in &model.supports {
                 let stiffness = support.penalty * model.stiffness[points.body[p] as usize];
@@ -164,6 +179,24 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
             element: &own.element,
             kind,
         });
+    }
+
+    /// Gives the last action the weights N_a(x_s) of the grid, if its carrier reaches all of their nodes.
+    fn weigh_by_grid(&mut self, grid: &Grid<D>, step: StepPoints<'_, D>) {
+        let Some(act) = self.acts.last() else { return };
+        let Some(at) = grid.interpolate(&act.place, 0.0, None) else { return };
+        let nodes = &step.influences.nodes[step.influences.row(act.point)];
+        let mut weights = vec![0.0; nodes.len()];
+        for (&node, &weight) in at.values.nodes.iter().zip(&at.values.weights).take(at.values.count)
+        {
+            match nodes.binary_search(&node) {
+                Ok(a) => weights[a] = weight,
+                // Nodes off a face that the element lies on.
+                Err(_) if weight.abs() < NO_WEIGHT => {}
+                Err(_) => return,
+            }
+        }
+        self.weights[act.weights..].copy_from_slice(&weights);
     }
 
     /// Adds this rank's shares of the force at an iterate, N, and the tangent of its negative where
@@ -288,7 +321,30 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                         of_a[i].map(|k| k * weights[b])
                     });
                 }
-                dense::apply(&stiff, &gap).map(|f| -f)
+                let mut f = dense::apply(&stiff, &gap).map(|f| -f);
+                if support.nitsche {
+                    let wanted = !block.is_empty();
+                    let (traction, slopes) = own_traction::on_area(
+                        step,
+                        act.point,
+                        &act.area,
+                        nodes,
+                        displacement,
+                        wanted,
+                    );
+                    let held = support.projection(act.element);
+                    let supplied = dense::apply(&held, &traction);
+                    f.iter_mut().zip(supplied).for_each(|(f, t)| *f += t);
+                    if wanted {
+                        let slopes: Vec<_> =
+                            slopes.iter().map(|slope| dense::multiply(&held, slope)).collect();
+                        let weights = weights.iter().copied();
+                        add_products::<D, _>(block, nodes.len(), weights, |b, w, i| {
+                            slopes[b][i].map(|slope| -w * slope)
+                        });
+                    }
+                }
+                f
             }
             Kind::Pressure(pressure) => {
                 let x = self.moved(act.place, act, nodes, displacement);
