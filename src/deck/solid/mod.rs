@@ -92,7 +92,13 @@ impl Solid {
         let overlaps = |min: &Place, max: &Place| {
             (0..3).all(|a| min[a] <= centre[a] + half[a] && centre[a] - half[a] <= max[a])
         };
-        self.boxes.visit(overlaps, |_| cut = true);
+        self.boxes.visit(overlaps, |index| {
+            let [p, q, r] = &self.triangles[index];
+            let end = |pick: fn(f64, f64) -> f64| -> Place {
+                std::array::from_fn(|a| pick(pick(p[a], q[a]), r[a]))
+            };
+            cut |= overlaps(&end(f64::min), &end(f64::max));
+        });
         match (cut, cut || self.contains(centre)) {
             (true, _) => Side::Cut,
             (false, true) => Side::Inside,
