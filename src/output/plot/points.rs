@@ -80,20 +80,8 @@ impl<'a> Scene<'a> {
     fn of(picture: &'a Picture<'a>) -> Self {
         let positions = &picture.frame.positions;
         let side = spacing(positions);
-        let (turn, tilt) = (-0.6_f64, 0.45_f64);
-        let project = |x: &[f32]| -> (f64, f64, f64) {
-            let [x, y, z] = [x[0], x[1], x[2]].map(f64::from);
-            if picture.flat {
-                return (x, y, 0.0);
-            }
-            let (ca, sa, cb, sb) = (turn.cos(), turn.sin(), tilt.cos(), tilt.sin());
-            (
-                ca * x + sa * y,
-                -sa * sb * x + ca * sb * y + cb * z,
-                sa * cb * x - ca * cb * y + sb * z,
-            )
-        };
-        let all: Vec<(f64, f64, f64)> = positions.chunks_exact(3).map(project).collect();
+        let all: Vec<(f64, f64, f64)> =
+            positions.chunks_exact(3).map(|x| projected(picture.flat, x)).collect();
         let end = |pick: fn(&(f64, f64, f64)) -> f64, most: bool| {
             let values = all.iter().map(pick);
             if most { values.fold(f64::MIN, f64::max) } else { values.fold(f64::MAX, f64::min) }
@@ -173,6 +161,18 @@ impl Drawing for Scene<'_> {
             Rectangle::new([(x - half, y - half), (x + half, y + half)], paint)
         });
         chart.draw_series(squares).map_err(said)?;
+        let (x, y) = (chart.x_range(), chart.y_range());
+        let (low, high) = ((x.start, y.start), (x.end, y.end));
+        let edges = self.picture.frame.edges.iter().filter_map(|ends| {
+            let place = |x: &[f32]| {
+                let (x, y, _) = projected(self.picture.flat, x);
+                (x, y)
+            };
+            clipped(place(&ends[..3]), place(&ends[3..]), low, high)
+        });
+        let style = BLACK.stroke_width(if self.picture.flat { 3 } else { 1 });
+        let lines = edges.map(|(a, b)| PathElement::new(vec![a, b], style));
+        chart.draw_series(lines).map_err(said)?;
         self.legend(&legend, height).map_err(said)?;
         area.present().map_err(said)
     }
@@ -212,6 +212,39 @@ impl Scene<'_> {
     }
 }
 
+/// Across, up and towards the reader, m: in the plane x and y; of a solid what is seen from the front,
+/// the right and above.
+fn projected(flat: bool, x: &[f32]) -> (f64, f64, f64) {
+    let [x, y, z] = [x[0], x[1], x[2]].map(f64::from);
+    if flat {
+        return (x, y, 0.0);
+    }
+    let (turn, tilt) = (-0.6_f64, 0.45_f64);
+    let (ca, sa, cb, sb) = (turn.cos(), turn.sin(), tilt.cos(), tilt.sin());
+    (ca * x + sa * y, -sa * sb * x + ca * sb * y + cb * z, sa * cb * x - ca * cb * y + sb * z)
+}
+
+type Place = (f64, f64);
+
+/// The part of a line inside a rectangle (Liang and Barsky 1984).
+fn clipped(a: Place, b: Place, low: Place, high: Place) -> Option<(Place, Place)> {
+    let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+    let (mut from, mut to) = (0.0_f64, 1.0_f64);
+    let sides = [(-dx, a.0 - low.0), (dx, high.0 - a.0), (-dy, a.1 - low.1), (dy, high.1 - a.1)];
+    for (step, room) in sides {
+        if step == 0.0 && room < 0.0 {
+            return None;
+        }
+        match step {
+            _ if step < 0.0 => from = from.max(room / step),
+            _ if step > 0.0 => to = to.min(room / step),
+            _ => {}
+        }
+    }
+    let at = |t: f64| (a.0 + t * dx, a.1 + t * dy);
+    (from <= to).then(|| (at(from), at(to)))
+}
+
 /// To a ten-thousandth of the range: more digits say nothing on a scale.
 fn rounded(value: f64, range: f64) -> f64 {
     if !(range > 0.0) {
@@ -219,4 +252,19 @@ fn rounded(value: f64, range: f64) -> f64 {
     }
     let unit = 10f64.powf((range * 1e-4).log10().floor());
     (value / unit).round() * unit
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_end_at_the_rectangle() {
+        let clip = |a, b| clipped(a, b, (0.0, 0.0), (2.0, 1.0));
+        assert_eq!(clip((-1.0, 0.5), (3.0, 0.5)), Some(((0.0, 0.5), (2.0, 0.5))));
+        assert_eq!(clip((0.5, 0.25), (1.5, 0.75)), Some(((0.5, 0.25), (1.5, 0.75))));
+        assert_eq!(clip((1.0, -1.0), (1.0, 3.0)), Some(((1.0, 0.0), (1.0, 1.0))));
+        assert_eq!(clip((3.0, 0.0), (3.0, 1.0)), None);
+        assert_eq!(clip((-1.0, 0.5), (1.0, 3.0)), None);
+    }
 }

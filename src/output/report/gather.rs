@@ -144,7 +144,10 @@ fn points(frames: &Frames) -> Value {
             .collect();
         let own: Vec<(f64, f64)> =
             frame.values.iter().map(|values| range(values.iter().copied())).collect();
+        let edges: Vec<Value> =
+            frame.edges.iter().flatten().map(|x| figure(f64::from(*x))).collect();
         json!({
+            "edges": edges,
             "step": frame.step, "time": frame.time, "places": places, "values": values, "ranges": own,
         })
     });

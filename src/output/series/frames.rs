@@ -23,6 +23,7 @@ const MOST_ROWS: usize = 20_000_000;
 const MANY: usize = 20_000_000;
 const TOGETHER: usize = 4096;
 const MOST_COLUMNS: usize = 24;
+const MOST_EDGES: usize = 5000;
 
 /// One number at each point.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +46,8 @@ pub struct Frame {
     pub positions: Vec<f32>,
     /// Of each column.
     pub values: Vec<Vec<f32>>,
+    /// Edges of the surfaces of rigid bodies: x, y, z of both ends.
+    pub edges: Vec<[f32; 6]>,
 }
 
 /// The frames of a results directory.
@@ -96,7 +99,7 @@ pub fn read(directory: &Path) -> Result<Frames> {
         let frame = open(path).and_then(|file| {
             sample(&file, *step, stride, &columns).map_err(|r| unreadable(path, &r))
         });
-        frames.push(frame?);
+        frames.push(with_edges(directory, frame?)?);
     }
     Ok(Frames { columns, frames, points, stride, written: all.len(), flat })
 }
@@ -128,7 +131,39 @@ pub fn read_one(directory: &Path, step: Option<usize>) -> Result<Frames> {
         let frame = sample(&file, step, stride, &columns)?;
         Ok(Frames { columns, frames: vec![frame], points, stride, written: all.len(), flat })
     };
-    frames().map_err(|reason| unreadable(path, &reason))
+    let mut read = frames().map_err(|reason| unreadable(path, &reason))?;
+    if let Some(frame) = read.frames.pop() {
+        read.frames.push(with_edges(directory, frame)?);
+    }
+    Ok(read)
+}
+
+/// Adds the surfaces of rigid bodies, where the run has written them.
+fn with_edges(directory: &Path, mut frame: Frame) -> Result<Frame> {
+    let path = directory.join(format!("rigid-{:06}.h5", frame.step));
+    if !path.exists() {
+        return Ok(frame);
+    }
+    let file = open(&path)?;
+    let edges = || -> hdf5::Result<Vec<[f32; 6]>> {
+        let (places, _) = table(&file, "coordinates", 1)?;
+        let (corners, width) = table(&file, "connectivity", 1)?;
+        let place = |corner: f64| places.get(3 * corner as usize..3 * corner as usize + 3);
+        let mut edges = Vec::new();
+        for facet in corners.chunks_exact(width.max(1)) {
+            // A segment has one edge, a triangle three.
+            for k in 0..if width == 2 { 1 } else { width } {
+                if let (Some(a), Some(b)) = (place(facet[k]), place(facet[(k + 1) % width])) {
+                    let mut ends = a.iter().chain(b).map(|x| *x as f32);
+                    edges.push(std::array::from_fn(|_| ends.next().unwrap_or(0.0)));
+                }
+            }
+        }
+        edges.truncate(MOST_EDGES);
+        Ok(edges)
+    };
+    frame.edges = edges().map_err(|reason| unreadable(&path, &reason))?;
+    Ok(frame)
 }
 
 /// Median distance of a point to its nearest neighbour, of 40 points; x, y, z of each.
@@ -290,7 +325,7 @@ fn sample(
         };
         values.push(all.chunks_exact(*width).map(of_row).collect());
     }
-    Ok(Frame { step, time, positions, values })
+    Ok(Frame { step, time, positions, values, edges: Vec::new() })
 }
 
 #[cfg(test)]

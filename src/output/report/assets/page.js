@@ -135,7 +135,9 @@
     group("Iterations of each step", history, (n) => ["newton_iterations", "linear_iterations", "cuts"].includes(n));
     group("Energies", history, (n) => n.startsWith("energy_") || n.startsWith("work_") || n.startsWith("dissipation_"));
     group("Reactions", history, (n) => /^reaction\..*\.[xyz]$/.test(n));
-    group("Contact", history, (n) => /^contact\./.test(n));
+    for (const quantity of ["area", "slip", "gap_max"])
+      group(`Contact: ${quantity}`, history, (n) => n.startsWith("contact.") && n.endsWith(`.${quantity}`));
+    group("Rigid bodies", history, (n) => /^rigid\./.test(n));
     group("Momentum", history, (n) => n.startsWith("momentum_"));
     group("Condition numbers", history, (n) => n.startsWith("kappa_"), { log: true });
     group("Time step", history, (n) => n === "dt");

@@ -119,6 +119,15 @@ const Points = (() => {
         }
       }
       context.putImageData(image, 0, 0);
+      // Rigid bodies by the edges of their surfaces.
+      const edges = this.data.frames[this.frame].edges;
+      context.strokeStyle = "#222"; context.lineWidth = this.flat ? 2.5 * ratio : ratio;
+      context.beginPath();
+      for (let k = 0; k < edges.length; k += 6) {
+        context.moveTo(...this.project(edges.slice(k, k + 3)));
+        context.lineTo(...this.project(edges.slice(k + 3, k + 6)));
+      }
+      context.stroke();
       canvas.dataset.drawn = drawn;
       canvas.dataset.frame = this.data.frames[this.frame].step;
       canvas.dataset.field = this.data.columns[this.field].name;
