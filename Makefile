@@ -1,5 +1,5 @@
 # Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
-.PHONY: gallery install-extras help setup build run install test bench iterations scaling compare docs validate lint clean
+.PHONY: gallery install-extras help setup build run install test bench iterations scaling compare docs validate portability lint clean
 
 RANKS ?= 2
 DECK  ?= inputs/beam.toml
@@ -17,6 +17,7 @@ help:
 	@echo "make scaling   strong and weak scaling: timed on this machine's cores, counted to 64 ranks"
 	@echo "make compare   KratosMPMApplication beside this program, in turn (network, minutes)"
 	@echo "make validate  the longer tests: decks with published numbers"
+	@echo "make portability  core tests against Debian's PETSc with 64-bit indices (network)"
 	@echo "make docs      the code's own documentation, and the book where mdbook is installed"
 	@echo "make gallery   a picture of every template, for docs/figures"
 	@echo "make install-extras  install, and the manual page and bash completions"
@@ -62,6 +63,10 @@ compare: build
 # Every deck with a published number, the long ones too; rewrites the tables of docs/validation*.md.
 validate: setup
 	MPM_PAR_VALIDATION=1 cargo test --release --no-fail-fast -- --include-ignored
+
+# Nothing is installed: packages are unpacked in target/portability.
+portability: setup
+	bash jobs/portability.sh
 
 # The book needs mdbook (cargo install mdbook); without it only the code's documentation is made.
 docs: setup

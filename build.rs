@@ -25,13 +25,13 @@ fn main() {
         .unwrap_or_else(|| match other_petsc() {
             Some((name, version)) => panic!(
                 "\nPETSc {version} was found (pkg-config module `{name}`), and PETSc {}.x is needed, \
-                 with real scalars and 32-bit indices.\n  try: Debian 12, whose libpetsc-real-dev has \
+                 with real scalars.\n  try: Debian 12, whose libpetsc-real-dev has \
                  it; or build PETSc {} from https://petsc.org and put the folder of its PETSc.pc into \
                  PKG_CONFIG_PATH\n",
                 PETSC_VERSIONS.0, PETSC_VERSIONS.0
             ),
             None => missing(
-                "PETSc (real scalars, 32-bit indices, 3.18.x)",
+                "PETSc (real scalars, 3.18.x)",
                 "libpetsc-real-dev",
                 "pkg-config modules `petsc` and `PETSc`; set PKG_CONFIG_PATH to add a folder",
             ),

@@ -14,6 +14,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::amg;
 use mpm_par::parallel::World;
+use mpm_par::petsc::Index;
 use mpm_par::petsc::{BlockProduct, CoarsestRows, Hierarchy, Session};
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -180,11 +181,11 @@ fn same_levels<const D: usize>(world: &World, block: Block<D>) {
         let largest: Vec<f64> = hierarchy.levels.iter().map(|level| level.largest).collect();
         let rows = &hierarchy.coarsest;
         let count = rows.offsets.len() - 1;
-        let first = world.exclusive_sum(count) as i32;
+        let first = world.exclusive_sum(count) as Index;
         let trace: f64 = (0..count)
             .flat_map(|row| {
                 let range = rows.offsets[row] as usize..rows.offsets[row + 1] as usize;
-                range.filter(move |&k| rows.columns[k] == first + row as i32)
+                range.filter(move |&k| rows.columns[k] == first + row as Index)
             })
             .map(|k| rows.values[k])
             .sum();

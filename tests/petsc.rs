@@ -6,6 +6,7 @@ use common::{on_ranks, on_ranks_with};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::error::{Error, Result};
+use mpm_par::petsc::Index;
 use mpm_par::petsc::{
     self, Blocks, Half, Ksp, Matrix, NewtonProblem, Session, Snes, Stored, Vector, Verdict,
 };
@@ -32,7 +33,7 @@ fn tridiagonal(
     own: &std::ops::Range<usize>,
     n: usize,
     shift: f64,
-) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
+) -> (Vec<Index>, Vec<Index>, Vec<f64>) {
     let (mut offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
     for row in own.clone() {
         let mut entries: Vec<(usize, f64)> = vec![(row, 2.0 + shift)];
@@ -49,9 +50,9 @@ fn tridiagonal(
             entries.push((0, -0.25));
         }
         entries.sort_by_key(|e| e.0);
-        columns.extend(entries.iter().map(|e| e.0 as i32));
+        columns.extend(entries.iter().map(|e| e.0 as Index));
         values.extend(entries.iter().map(|e| e.1));
-        offsets.push(columns.len() as i32);
+        offsets.push(columns.len() as Index);
     }
     (offsets, columns, values)
 }
@@ -173,8 +174,8 @@ fn linear_solver_follows_the_matrix() {
 
         // A singular matrix is an outcome with a readable reason.
         let own = share(&world, 6, 1);
-        let offsets: Vec<i32> = (0..=own.len() as i32).collect();
-        let columns: Vec<i32> = own.clone().map(|r| r as i32).collect();
+        let offsets: Vec<Index> = (0..=own.len() as Index).collect();
+        let columns: Vec<Index> = own.clone().map(|r| r as Index).collect();
         let values: Vec<f64> = own.clone().map(|r| if r == 3 { 0.0 } else { 1.0 }).collect();
         let a = Matrix::from_csr(&world, 1, own.len(), &offsets, &columns, &values).unwrap();
         let mut ksp = Ksp::new(&world, "s_").unwrap();
@@ -266,8 +267,8 @@ fn newton_solves_and_stops_together() {
 
         let mut run = |n: usize, fail_in: &'static str, start: f64| {
             let own = share(&world, n, 1);
-            let offsets: Vec<i32> = (0..=own.len() as i32).collect();
-            let columns: Vec<i32> = own.clone().map(|r| r as i32).collect();
+            let offsets: Vec<Index> = (0..=own.len() as Index).collect();
+            let columns: Vec<Index> = own.clone().map(|r| r as Index).collect();
             let ones = vec![1.0; own.len()];
             let mut a = Matrix::from_csr(&world, 1, own.len(), &offsets, &columns, &ones).unwrap();
             let mut x = a.vector().unwrap();
@@ -471,7 +472,7 @@ fn membrane(
     n: usize,
     block: usize,
     shift: impl Fn(usize) -> f64,
-) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
+) -> (Vec<Index>, Vec<Index>, Vec<f64>) {
     let (mut offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
     for row in own.clone() {
         let (node, axis) = (row / block, row % block);
@@ -483,12 +484,12 @@ fn membrane(
                     let coupling = if axis == other_axis { 1.0 } else { 0.1 };
                     let own_share = if other == node { 8.3 } else { -1.0 };
                     let more = if other * block + other_axis == row { shift(row) } else { 0.0 };
-                    columns.push((other * block + other_axis) as i32);
+                    columns.push((other * block + other_axis) as Index);
                     values.push(coupling * own_share + more);
                 }
             }
         }
-        offsets.push(columns.len() as i32);
+        offsets.push(columns.len() as Index);
     }
     (offsets, columns, values)
 }
@@ -496,7 +497,7 @@ fn membrane(
 /// Block row `row` of compressed rows in blocks of `R` x `C`.
 fn block_row<const R: usize, const C: usize>(
     row: usize,
-    (offsets, columns, values): (&[i32], &[i32], &[f64]),
+    (offsets, columns, values): (&[Index], &[Index], &[f64]),
 ) -> Vec<(usize, [[f64; C]; R])> {
     let start = |r: usize| offsets[row * R + r] as usize;
     let count = (offsets[row * R + 1] as usize - start(0)) / C;
@@ -509,13 +510,15 @@ fn block_row<const R: usize, const C: usize>(
         .collect()
 }
 
-fn blocks<T: Stored, const R: usize, const C: usize>(rows: (&[i32], &[i32], &[f64])) -> Blocks<T> {
+fn blocks<T: Stored, const R: usize, const C: usize>(
+    rows: (&[Index], &[Index], &[f64]),
+) -> Blocks<T> {
     let mut growing = Blocks::growing([R, C], 0).unwrap();
     (0..(rows.0.len() - 1) / R).for_each(|row| growing.push(&block_row::<R, C>(row, rows)));
     growing.finish()
 }
 
-fn half<T: Stored, const K: usize>(rows: (&[i32], &[i32], &[f64])) -> Half<T> {
+fn half<T: Stored, const K: usize>(rows: (&[Index], &[Index], &[f64])) -> Half<T> {
     let mut half = Half::growing(K, 0).unwrap();
     // Twice: what was there before leaves no trace.
     for _ in 0..2 {
@@ -564,7 +567,7 @@ fn blocks_multiply<T: Stored, const K: usize>() {
         assert!((sum[r] - x[r] - exact).abs() < tolerance + 1e-15, "{K}, {r}");
     }
     // Rows without entries, at the end too.
-    let empty: Vec<i32> = std::iter::repeat_n(0, 2 * K)
+    let empty: Vec<Index> = std::iter::repeat_n(0, 2 * K)
         .chain(offsets.iter().copied())
         .chain(std::iter::repeat_n(offsets[rows], K))
         .collect();
@@ -582,8 +585,9 @@ fn oblong_blocks_multiply_both_ways() {
     let (mut offsets, mut columns) = (vec![0], Vec::new());
     for row in pattern {
         for _ in 0..2 {
-            columns.extend(row.iter().flat_map(|&block| (0..3).map(move |c| 3 * block as i32 + c)));
-            offsets.push(columns.len() as i32);
+            columns
+                .extend(row.iter().flat_map(|&block| (0..3).map(move |c| 3 * block as Index + c)));
+            offsets.push(columns.len() as Index);
         }
     }
     let values: Vec<f64> = (0..columns.len()).map(|k| (k as f64 * 0.9).sin()).collect();
@@ -611,7 +615,7 @@ fn oblong_blocks_multiply_both_ways() {
 }
 
 /// Compressed rows of a symmetric pattern of blocks: `pairs` of block rows, mirrored.
-fn mirrored(block: usize, rows: usize, pairs: &[(usize, usize)]) -> (Vec<i32>, Vec<i32>) {
+fn mirrored(block: usize, rows: usize, pairs: &[(usize, usize)]) -> (Vec<Index>, Vec<Index>) {
     let (mut offsets, mut columns) = (vec![0], Vec::new());
     for row in 0..rows {
         let other = |&(i, j): &(usize, usize)| {
@@ -620,16 +624,16 @@ fn mirrored(block: usize, rows: usize, pairs: &[(usize, usize)]) -> (Vec<i32>, V
         let blocks: std::collections::BTreeSet<usize> = pairs.iter().filter_map(other).collect();
         for _ in 0..block {
             columns.extend(
-                blocks.iter().flat_map(|&j| (block * j..block * (j + 1)).map(|c| c as i32)),
+                blocks.iter().flat_map(|&j| (block * j..block * (j + 1)).map(|c| c as Index)),
             );
-            offsets.push(columns.len() as i32);
+            offsets.push(columns.len() as Index);
         }
     }
     (offsets, columns)
 }
 
 /// Values of the mirrored entries that differ by rounding, as sums in another order do.
-fn nearly_symmetric(offsets: &[i32], columns: &[i32]) -> Vec<f64> {
+fn nearly_symmetric(offsets: &[Index], columns: &[Index]) -> Vec<f64> {
     let mut values = Vec::new();
     for (row, range) in offsets.windows(2).enumerate() {
         for &column in &columns[range[0] as usize..range[1] as usize] {
@@ -643,8 +647,8 @@ fn nearly_symmetric(offsets: &[i32], columns: &[i32]) -> Vec<f64> {
 
 /// A x with the values as `T`, of each mirrored pair the lower; and sum |A x|.
 fn lower_product<T: Stored>(
-    offsets: &[i32],
-    columns: &[i32],
+    offsets: &[Index],
+    columns: &[Index],
     values: &[f64],
     x: &[f64],
 ) -> Vec<(f64, f64)> {

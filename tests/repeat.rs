@@ -6,6 +6,7 @@ use common::on_ranks;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::analysis::solver::Linear;
+use mpm_par::petsc::Index;
 use mpm_par::petsc::{Ksp, Matrix, Session};
 
 const CELLS: usize = 60;
@@ -67,9 +68,9 @@ fn system(comm: &SimpleCommunicator) -> (Matrix, Vec<f64>) {
                 }
             }
         }
-        columns.extend(entries.keys().map(|&c| c as i32));
+        columns.extend(entries.keys().map(|&c| c as Index));
         values.extend(entries.values());
-        offsets.push(columns.len() as i32);
+        offsets.push(columns.len() as Index);
     }
     let n = 2 * (end - first);
     let mut a = Matrix::from_csr(comm, 2, n, &offsets, &columns, &values).unwrap();

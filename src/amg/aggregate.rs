@@ -8,6 +8,7 @@
 
 use crate::error::Result;
 use crate::parallel::World;
+use crate::petsc::Index;
 
 use super::level::Nodes;
 use super::strength::Strong;
@@ -16,7 +17,7 @@ use super::strength::Strong;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Group {
     /// Global number of the coarse node.
-    pub number: i32,
+    pub number: Index,
     /// Key and position of the root.
     pub key: f64,
     pub root: [f64; 3],
@@ -48,7 +49,8 @@ impl Aggregates {
         let mut group = vec![None; nodes.local()];
         for (k, &root) in roots.iter().enumerate() {
             let (key, position) = (nodes.key[root as usize], nodes.position[root as usize]);
-            group[root as usize] = Some(Group { number: (first + k) as i32, key, root: position });
+            group[root as usize] =
+                Some(Group { number: (first + k) as Index, key, root: position });
         }
         let mut aggregates = Aggregates { group, roots, first, total };
         // Next to several roots, or two couplings away from them, a node has to choose.
@@ -93,13 +95,13 @@ impl Aggregates {
         let owned = self.group[..nodes.owned].iter().zip(values.chunks_exact_mut(VALUES));
         for (group, values) in owned.filter_map(|(group, values)| Some((group.as_ref()?, values))) {
             let [x, y, z] = group.root;
-            values.copy_from_slice(&[group.number.into(), group.key, x, y, z]);
+            values.copy_from_slice(&[group.number as f64, group.key, x, y, z]);
         }
         nodes.halo.forward(world, &mut values, VALUES)?;
         let ghosts = values.chunks_exact(VALUES).zip(&mut self.group).skip(nodes.owned);
         for (values, group) in ghosts {
             *group = (values[0] >= 0.0).then(|| Group {
-                number: values[0] as i32,
+                number: values[0] as Index,
                 key: values[1],
                 root: [values[2], values[3], values[4]],
             });

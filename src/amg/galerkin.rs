@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::parallel::{HaloPlan, World, exchange};
+use crate::petsc::Index;
 use crate::tensor::fused::{self, Block, add_product, add_transposed_product};
 
 use super::aggregate::Aggregates;
@@ -17,15 +18,15 @@ pub struct Coarse<const C: usize> {
 
 /// Coarse nodes seen by the fine ones of this rank: owned ones first, then ghosts, ascending.
 struct Seen {
-    first: i32,
+    first: Index,
     owned: usize,
-    ghosts: Vec<i32>,
+    ghosts: Vec<Index>,
 }
 
 impl Seen {
-    fn new(owners: &Owners, mut ghosts: Vec<i32>) -> Self {
-        let (first, owned) = (owners.owned().start as i32, owners.owned().len());
-        ghosts.retain(|&number| !(first..first + owned as i32).contains(&number));
+    fn new(owners: &Owners, mut ghosts: Vec<Index>) -> Self {
+        let (first, owned) = (owners.owned().start as Index, owners.owned().len());
+        ghosts.retain(|&number| !(first..first + owned as Index).contains(&number));
         ghosts.sort_unstable();
         ghosts.dedup();
         Seen { first, owned, ghosts }
@@ -37,12 +38,16 @@ impl Seen {
 
     /// Place of a global number that is known to be there.
     #[inline(always)]
-    fn place(&self, number: i32) -> usize {
+    fn place(&self, number: Index) -> usize {
         level::place(self.first, self.owned, &self.ghosts, number)
     }
 
-    fn number(&self, place: usize) -> i32 {
-        if place < self.owned { self.first + place as i32 } else { self.ghosts[place - self.owned] }
+    fn number(&self, place: usize) -> Index {
+        if place < self.owned {
+            self.first + place as Index
+        } else {
+            self.ghosts[place - self.owned]
+        }
     }
 }
 
@@ -85,12 +90,12 @@ pub fn coarse_operator<const K: usize, const C: usize>(
     let received = hand_over(world, &owners, &seen, &sums)?;
 
     // Columns that come with other ranks' contributions, and those of the transfer.
-    let mut ghosts: Vec<i32> = Vec::new();
+    let mut ghosts: Vec<Index> = Vec::new();
     let own_rows = sums.rows[..seen.owned].iter().flatten();
     ghosts.extend(own_rows.map(|&(column, _)| seen.number(column as usize)));
     ghosts.extend_from_slice(&prolongator.columns[..prolongator.offsets[nodes.owned]]);
     let each = || received.iter().flat_map(|(_, words)| words.chunks_exact(2 + C * C));
-    ghosts.extend(each().map(|entry| entry[1] as i32));
+    ghosts.extend(each().map(|entry| entry[1] as Index));
     let known = Seen::new(&owners, ghosts);
     let place: Vec<u32> =
         (0..seen.len()).map(|place| known.place(seen.number(place)) as u32).collect();
@@ -100,7 +105,7 @@ pub fn coarse_operator<const K: usize, const C: usize>(
         entries.sort_unstable();
     }
     for entry in each() {
-        let (row, column) = (known.place(entry[0] as i32), known.place(entry[1] as i32));
+        let (row, column) = (known.place(entry[0] as Index), known.place(entry[1] as Index));
         let block = sums.block(row, column as u32);
         for (sum, value) in block.iter_mut().flatten().zip(&entry[2..]) {
             *sum += value;
@@ -204,7 +209,7 @@ fn hand_over<const C: usize>(
         }
         let Some((_, words)) = outgoing.last_mut() else { continue };
         for &(column, place) in entries {
-            words.extend([row, column as usize].map(|place| f64::from(seen.number(place))));
+            words.extend([row, column as usize].map(|place| seen.number(place) as f64));
             words.extend(sums.blocks[place as usize].iter().flatten());
         }
     }

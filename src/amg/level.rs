@@ -1,6 +1,7 @@
 //! What one level of multigrid is on one rank: its nodes, and the rows of its matrix in blocks.
 
 use crate::parallel::HaloPlan;
+use crate::petsc::Index;
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::tensor::fused::Block;
@@ -10,7 +11,7 @@ use crate::tensor::fused::Block;
 pub struct Nodes {
     pub owned: usize,
     /// Global number of each local node; owned ones are consecutive.
-    pub global: Vec<i32>,
+    pub global: Vec<Index>,
     /// Owner <-> ghost exchange of nodal values.
     pub halo: HaloPlan,
     /// m; the third coordinate is zero in the plane.
@@ -26,7 +27,7 @@ impl Nodes {
     }
 
     /// Place of a global number that is known to be here.
-    pub fn place(&self, number: i32) -> usize {
+    pub fn place(&self, number: Index) -> usize {
         let (own, ghosts) = self.global.split_at(self.owned);
         place(own.first().copied().unwrap_or(0), self.owned, ghosts, number)
     }
@@ -34,7 +35,7 @@ impl Nodes {
 
 /// Where a global number stands among `owned` ones from `first` on and the `ghosts` behind them.
 #[inline(always)]
-pub fn place(first: i32, owned: usize, ghosts: &[i32], number: i32) -> usize {
+pub fn place(first: Index, owned: usize, ghosts: &[Index], number: Index) -> usize {
     let own = number.wrapping_sub(first) as usize;
     if own < owned { own } else { owned + ghosts.partition_point(|&ghost| ghost < number) }
 }

@@ -30,6 +30,7 @@ pub mod spectrum;
 pub mod strength;
 pub mod symmetric_part;
 
+use crate::petsc::Index;
 use level::{Assembled, Nodes, Rows};
 use symmetric_part::symmetric_part;
 
@@ -240,11 +241,11 @@ fn coarsest<const C: usize>(coarse: &Coarse<C>) -> CoarsestRows {
             for (number, column, block) in &entries {
                 let own = *column as usize == row;
                 let scale = (0..C).map(|k| block[k][k]).fold(f64::MIN_POSITIVE, f64::max);
-                result.columns.extend((0..C as i32).map(|c| number * C as i32 + c));
+                result.columns.extend((0..C as Index).map(|c| number * C as Index + c));
                 let trace = |c: usize| if own && c == r { TRACE * scale } else { 0.0 };
                 result.values.extend((0..C).map(|c| block[r][c] + trace(c)));
             }
-            result.offsets.push(result.columns.len() as i32);
+            result.offsets.push(result.columns.len() as Index);
         }
     }
     result

@@ -1,6 +1,7 @@
 //! Who owns the nodes of a coarse level: the ranks of their roots while these have plenty, then one of
 //! every 2, 4, 8, ... ranks. A level of a few nodes on each of many ranks is all messages.
 
+use crate::petsc::Index;
 use std::ops::Range;
 
 use crate::error::Result;
@@ -45,7 +46,7 @@ impl Owners {
         self.first[self.rank]..end
     }
 
-    pub fn of_number(&self, number: i32) -> usize {
+    pub fn of_number(&self, number: Index) -> usize {
         self.first.partition_point(|&first| first <= number as usize) - 1
     }
 
@@ -62,7 +63,7 @@ impl Owners {
         // They are consecutive, and those of all members of a group go to the same rank.
         let outgoing = match aggregates.roots.len() {
             0 => Vec::new(),
-            _ => vec![(self.of_number(aggregates.first as i32), values)],
+            _ => vec![(self.of_number(aggregates.first as Index), values)],
         };
         // In ascending order of the ranks, as the nodes are.
         Ok(exchange(world, outgoing)?.into_iter().flat_map(|(_, values)| values).collect())

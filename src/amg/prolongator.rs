@@ -3,6 +3,7 @@
 
 use crate::error::Result;
 use crate::parallel::{World, exchange};
+use crate::petsc::Index;
 use crate::tensor::fused::{self, Block, add_product};
 
 use super::aggregate::{Aggregates, Group};
@@ -14,7 +15,7 @@ use super::strength::Strong;
 pub struct Prolongator<const K: usize, const C: usize> {
     pub offsets: Vec<usize>,
     /// Global numbers of coarse nodes.
-    pub columns: Vec<i32>,
+    pub columns: Vec<Index>,
     pub values: Vec<Block<K, C>>,
 }
 
@@ -145,7 +146,7 @@ impl<const K: usize, const C: usize> Prolongator<K, C> {
             for &local in locals {
                 let (columns, values) = self.row(local as usize);
                 words.push(columns.len() as f64);
-                words.extend(columns.iter().map(|&column| f64::from(column)));
+                words.extend(columns.iter().map(|&column| column as f64));
                 words.extend(values.iter().flatten().flatten());
             }
             (rank, words)
@@ -156,7 +157,7 @@ impl<const K: usize, const C: usize> Prolongator<K, C> {
             while let [count, tail @ ..] = rest {
                 let (columns, tail) = tail.split_at(*count as usize);
                 let (values, tail) = tail.split_at(columns.len() * K * C);
-                self.columns.extend(columns.iter().map(|&column| column as i32));
+                self.columns.extend(columns.iter().map(|&column| column as Index));
                 let blocks = values.chunks_exact(K * C);
                 self.values.extend(blocks.map(|block| {
                     std::array::from_fn(|r| std::array::from_fn(|c| block[r * C + c]))
@@ -170,7 +171,7 @@ impl<const K: usize, const C: usize> Prolongator<K, C> {
 
     /// Columns and blocks of a local node.
     #[inline(always)]
-    pub fn row(&self, node: usize) -> (&[i32], &[Block<K, C>]) {
+    pub fn row(&self, node: usize) -> (&[Index], &[Block<K, C>]) {
         let range = self.offsets[node]..self.offsets[node + 1];
         (&self.columns[range.clone()], &self.values[range])
     }

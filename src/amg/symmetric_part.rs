@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use crate::parallel::{HaloPlan, World, exchange};
+use crate::petsc::Index;
 use crate::tensor::fused::Block;
 
 use super::level::{BlockRows, Rows};
@@ -15,7 +16,7 @@ use super::level::{BlockRows, Rows};
 pub fn symmetric_part<const K: usize>(
     world: &World,
     owned: usize,
-    global: &[i32],
+    global: &[Index],
     halo: &HaloPlan,
     rows: &impl Rows<K>,
 ) -> Result<BlockRows<K>> {
@@ -39,7 +40,7 @@ pub fn symmetric_part<const K: usize>(
             own += 1;
             if column >= owned {
                 let words = &mut outgoing[owners[column - owned] as usize].1;
-                words.extend([global[column], global[row]].map(f64::from));
+                words.extend([global[column], global[row]].map(|number| number as f64));
                 words.extend(block.iter().flatten());
                 return;
             }
@@ -55,8 +56,8 @@ pub fn symmetric_part<const K: usize>(
     let first = global.first().copied().unwrap_or(0);
     for (_, words) in exchange(world, outgoing)? {
         for entry in words.chunks_exact(2 + K * K) {
-            let row = (entry[0] as i32 - first) as usize;
-            let column = entry[1] as i32;
+            let row = (entry[0] as Index - first) as usize;
+            let column = entry[1] as Index;
             let Some(range) = sums.offsets.get(row..row + 2) else {
                 whole = false;
                 continue;

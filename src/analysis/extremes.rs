@@ -12,7 +12,7 @@ use nalgebra::DMatrix;
 use crate::error::Result;
 use crate::mass::inverse::MassInverse;
 use crate::parallel::World;
-use crate::petsc::{Ksp, Matrix};
+use crate::petsc::{Index, Ksp, Matrix};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockMatrix;
@@ -122,19 +122,19 @@ impl<const B: usize> Reduced<'_, B> {
         // Held rows decouple and the start is zero there: the iteration never sees them.
         let numbering = self.numbering;
         let rows = numbering.owned * B;
-        let (mut offsets, mut columns, mut values) = (vec![0i32], Vec::new(), Vec::new());
+        let (mut offsets, mut columns, mut values) = (vec![0 as Index], Vec::new(), Vec::new());
         let mut last = 0;
         self.for_each_entry(|row, column, value| {
             if row != last {
-                offsets.push(columns.len() as i32);
+                offsets.push(columns.len() as Index);
                 last = row;
             }
-            let global = numbering.global[column / B] * B as i32 + (column % B) as i32;
+            let global = numbering.global[column / B] * B as Index + (column % B) as Index;
             columns.push(global);
             let inside = numbers[row].is_some() && numbers[column].is_some();
             values.push(if inside { value } else { f64::from(u8::from(row == column)) });
         });
-        offsets.resize(rows + 1, columns.len() as i32);
+        offsets.resize(rows + 1, columns.len() as Index);
         let comm = self.world.comm();
         let matrix = Matrix::from_csr(comm, B, rows, &offsets, &columns, &values)?;
         let (mut right, mut left) = (matrix.vector()?, matrix.vector()?);

@@ -14,7 +14,7 @@ use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
-use crate::petsc::{Rehearsal, options};
+use crate::petsc::{Index, Rehearsal, options};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 
@@ -259,6 +259,29 @@ pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usiz
     rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, shape, false, 3))
 }
 
+/// A matrix of `N` unknowns per node, still zero. Collective.
+pub fn block_matrix<const N: usize>(
+    world: &World,
+    numbering: &Numbering,
+    pattern: &Pattern,
+) -> Result<Matrix> {
+    let rows = numbering.owned * N;
+    let mut offsets = Vec::with_capacity(rows + 1);
+    let mut columns = Vec::with_capacity(pattern.ghost_start * N * N);
+    offsets.push(0);
+    for row in 0..numbering.owned {
+        let nodes = &pattern.columns[pattern.offsets[row]..pattern.offsets[row + 1]];
+        for _ in 0..N {
+            for &node in nodes {
+                let first = numbering.global[node as usize] * N as Index;
+                columns.extend((0..N as Index).map(|k| first + k));
+            }
+            offsets.push(columns.len() as Index);
+        }
+    }
+    Matrix::zeros(world.comm(), N, rows, &offsets, &columns)
+}
+
 /// The system's matrix, still zero, with its block size and near-null space. Collective.
 pub fn matrix<const D: usize>(
     world: &World,
@@ -266,21 +289,7 @@ pub fn matrix<const D: usize>(
     numbering: &Numbering,
     pattern: &Pattern,
 ) -> Result<Matrix> {
-    let rows = numbering.owned * D;
-    let mut offsets = Vec::with_capacity(rows + 1);
-    let mut columns = Vec::with_capacity(pattern.ghost_start * D * D);
-    offsets.push(0);
-    for row in 0..numbering.owned {
-        let nodes = &pattern.columns[pattern.offsets[row]..pattern.offsets[row + 1]];
-        for _ in 0..D {
-            for &node in nodes {
-                let first = numbering.global[node as usize] * D as i32;
-                columns.extend((0..D as i32).map(|k| first + k));
-            }
-            offsets.push(columns.len() as i32);
-        }
-    }
-    let mut matrix = Matrix::zeros(world.comm(), D, rows, &offsets, &columns)?;
+    let mut matrix = block_matrix::<D>(world, numbering, pattern)?;
     matrix.set_symmetric(model.symmetric())?;
     let coordinates: Vec<f64> = numbering.nodes[..numbering.owned]
         .iter()

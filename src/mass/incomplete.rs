@@ -328,7 +328,7 @@ mod tests {
             offset: 0,
             total: rows,
             nodes: (0..rows).collect(),
-            global: (0..rows as i32).collect(),
+            global: (0..rows as crate::petsc::Index).collect(),
             index: NodeIndex::new(0..rows),
             halo: HaloPlan::default(),
         };

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::error::Result;
 use crate::parallel::World;
-use crate::petsc::{Matrix, ShellSystem};
+use crate::petsc::{Index, Matrix, ShellSystem};
 use crate::system::border::Border;
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
@@ -94,19 +94,19 @@ impl<const C: usize> ShellSystem for System<'_, C> {
             *marks = free.map(|free| f64::from(u8::from(free)));
         }
         numbering.halo.forward(world, free.as_flattened_mut(), C)?;
-        let (mut offsets, mut columns, mut values) = (vec![0i32], Vec::new(), Vec::new());
+        let (mut offsets, mut columns, mut values) = (vec![0 as Index], Vec::new(), Vec::new());
         for row in 0..numbering.owned {
             for k in 0..C {
                 for entry in pattern.offsets[row]..pattern.offsets[row + 1] {
                     let column = pattern.columns[entry] as usize;
-                    columns.push(numbering.global[column] * C as i32 + k as i32);
+                    columns.push(numbering.global[column] * C as Index + k as Index);
                     values.push(if free[row][k] > 0.0 && free[column][k] > 0.0 {
                         matrix.values[entry]
                     } else {
                         f64::from(u8::from(column == row))
                     });
                 }
-                offsets.push(columns.len() as i32);
+                offsets.push(columns.len() as Index);
             }
         }
         let rows = numbering.owned * C;

@@ -14,7 +14,8 @@ use super::half::Half;
 use super::object::Object;
 use super::stored::Stored;
 use super::sys;
-use super::vector::{Values, ValuesMut, index};
+use super::vector::DETERMINE;
+use super::vector::{Index, Values, ValuesMut, index};
 use crate::error::{Error, Result};
 use crate::tensor::fused::Block;
 
@@ -24,7 +25,7 @@ pub struct BlockProduct<T> {
     own: Own<T>,
     other: Blocks<T>,
     /// Global block column of each column of `other`.
-    ghosts: Vec<i32>,
+    ghosts: Vec<Index>,
     /// Scalar rows, and columns of this rank.
     size: [usize; 2],
     /// Columns in a block.
@@ -51,7 +52,7 @@ impl<T: Stored> BlockProduct<T> {
     pub fn collect<const R: usize, const C: usize>(
         rows: usize,
         own_columns: usize,
-        ghosts: Vec<i32>,
+        ghosts: Vec<Index>,
         blocks: usize,
         row: impl FnMut(usize, &mut Row<R, C>),
     ) -> Self {
@@ -75,7 +76,7 @@ impl<T: Stored> BlockProduct<T> {
     ///
     /// # Panics
     /// As [`Self::collect`].
-    pub fn symmetric<const K: usize>(rows: usize, ghosts: Vec<i32>, blocks: usize) -> Self {
+    pub fn symmetric<const K: usize>(rows: usize, ghosts: Vec<Index>, blocks: usize) -> Self {
         let own = Half::growing(K, (blocks + rows) / 2).expect("blocks with a kernel");
         let other = Blocks::growing([K, K], 0).expect("blocks with a kernel").finish();
         let size = [rows * K; 2];
@@ -86,7 +87,7 @@ impl<T: Stored> BlockProduct<T> {
     ///
     /// # Panics
     /// As [`Self::collect`].
-    pub fn unsymmetric<const K: usize>(rows: usize, ghosts: Vec<i32>, blocks: usize) -> Self {
+    pub fn unsymmetric<const K: usize>(rows: usize, ghosts: Vec<Index>, blocks: usize) -> Self {
         let new = |blocks| Blocks::growing([K, K], blocks).expect("blocks with a kernel").finish();
         let size = [rows * K; 2];
         BlockProduct { own: Own::Whole(new(blocks)), other: new(0), ghosts, size, wide: K }
@@ -217,7 +218,7 @@ impl<T: Stored> Shell<T> {
         let mut shell = Object(null_mut());
         let data = Box::new(Context { product, ghosts: None });
         let data = Box::into_raw(data);
-        let all = sys::PETSC_DETERMINE;
+        let all = DETERMINE;
         petsc!(MatCreateShell(
             comm.as_raw(),
             rows,

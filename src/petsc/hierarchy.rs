@@ -6,6 +6,7 @@
 //! than half the bytes. The iteration outside keeps the exact matrix, so the answer is the same.
 //! The levels are symmetric. Under an unsymmetric matrix A they are those of (A + A^T) / 2.
 
+use super::vector::Index;
 use std::ptr::{null, null_mut};
 
 use mpi::collective::SystemOperation;
@@ -41,8 +42,8 @@ pub struct Smoothed {
 #[derive(Debug, Default)]
 pub struct CoarsestRows {
     pub block: usize,
-    pub offsets: Vec<i32>,
-    pub columns: Vec<i32>,
+    pub offsets: Vec<Index>,
+    pub columns: Vec<Index>,
     pub values: Vec<f64>,
 }
 

@@ -14,7 +14,8 @@ use mpi::traits::{AsRaw, CommunicatorCollectives};
 
 use super::check::{agree, bool_of, petsc, require_running, running};
 use super::sys;
-use super::vector::{Vector, index};
+use super::vector::DETERMINE;
+use super::vector::{Index, Vector, index};
 use crate::error::{Error, Result};
 
 /// Owner of a PETSc `Mat`, square, with as many columns as rows on each rank.
@@ -39,14 +40,14 @@ impl Matrix {
     /// `columns[row_offsets[r]..row_offsets[r + 1]]`, global and ascending, with `values`.
     /// `rows_local` is a multiple of `block_size`; ranks own consecutive rows in rank order.
     ///
-    /// Errors, the same on every rank: more rows than a 32-bit number can count, offsets or
+    /// Errors, the same on every rank: more rows than an index can count, offsets or
     /// columns out of order or range.
     pub fn from_csr(
         comm: &SimpleCommunicator,
         block_size: usize,
         rows_local: usize,
-        row_offsets: &[i32],
-        columns: &[i32],
+        row_offsets: &[Index],
+        columns: &[Index],
         values: &[f64],
     ) -> Result<Self> {
         let given = check_values(columns, values);
@@ -61,8 +62,8 @@ impl Matrix {
         comm: &SimpleCommunicator,
         block_size: usize,
         rows_local: usize,
-        row_offsets: &[i32],
-        columns: &[i32],
+        row_offsets: &[Index],
+        columns: &[Index],
     ) -> Result<Self> {
         require_running()?;
         let mut below = 0u64;
@@ -91,7 +92,7 @@ impl Matrix {
             spd: None,
         };
         petsc!(MatCreate(comm.as_raw(), &mut matrix.raw))?;
-        petsc!(MatSetSizes(matrix.raw, n, n, sys::PETSC_DETERMINE, sys::PETSC_DETERMINE))?;
+        petsc!(MatSetSizes(matrix.raw, n, n, DETERMINE, DETERMINE))?;
         petsc!(MatSetBlockSize(matrix.raw, block))?;
         petsc!(MatSetType(matrix.raw, sys::MATAIJ.as_ptr().cast()))?;
         matrix.set_pattern(columns, own)?;
@@ -110,7 +111,7 @@ impl Matrix {
 
     /// Hands PETSc the columns as they will be stored: entered row by row they would be searched
     /// for and sorted once more. `own`: columns of this rank.
-    fn set_pattern(&mut self, columns: &[i32], own: std::ops::Range<usize>) -> Result<()> {
+    fn set_pattern(&mut self, columns: &[Index], own: std::ops::Range<usize>) -> Result<()> {
         let rows = || self.row_offsets.windows(2).map(|row| &columns[row[0]..row[1]]);
         let split: Vec<(u32, u32)> = rows()
             .map(|columns| {
@@ -119,9 +120,9 @@ impl Matrix {
                 (left as u32, (end - left) as u32)
             })
             .collect();
-        let inside: Vec<i32> = split.iter().map(|split| split.1 as i32).collect();
-        let outside: Vec<i32> =
-            rows().zip(&inside).map(|(columns, inside)| columns.len() as i32 - inside).collect();
+        let inside: Vec<Index> = split.iter().map(|split| split.1 as Index).collect();
+        let outside: Vec<Index> =
+            rows().zip(&inside).map(|(columns, inside)| columns.len() as Index - inside).collect();
         // Each of the two does nothing on a matrix of the other type.
         petsc!(MatSeqAIJSetPreallocation(self.raw, 0, inside.as_ptr()))?;
         petsc!(MatMPIAIJSetPreallocation(self.raw, 0, inside.as_ptr(), 0, outside.as_ptr()))?;
@@ -133,7 +134,7 @@ impl Matrix {
                 for (columns, &(left, count)) in rows().zip(&split) {
                     let (left, rest) = columns.split_at(left as usize);
                     let (inside, right) = rest.split_at(count as usize);
-                    here.extend(inside.iter().map(|&c| c - own.start as i32));
+                    here.extend(inside.iter().map(|&c| c - own.start as Index));
                     elsewhere.extend_from_slice(left);
                     elsewhere.extend_from_slice(right);
                 }
@@ -353,7 +354,7 @@ fn stored(matrix: sys::Mat) -> Result<usize> {
     Ok(unsafe { info.assume_init() }.nz_used as usize)
 }
 
-fn check_values(columns: &[i32], values: &[f64]) -> Result<()> {
+fn check_values(columns: &[Index], values: &[f64]) -> Result<()> {
     if values.len() == columns.len() {
         return Ok(());
     }
@@ -368,8 +369,8 @@ fn check_rows(
     block_size: usize,
     own: &std::ops::Range<usize>,
     rows_global: u64,
-    row_offsets: &[i32],
-    columns: &[i32],
+    row_offsets: &[Index],
+    columns: &[Index],
 ) -> Result<()> {
     let fail = |what: String| Err(Error::Environment(format!("matrix pattern: {what}")));
     let rows = own.len();
@@ -409,7 +410,7 @@ mod tests {
 
     #[test]
     fn wrong_patterns_are_named() {
-        let text = |offsets: &[i32], columns: &[i32]| {
+        let text = |offsets: &[Index], columns: &[Index]| {
             check_rows(1, &(4..6), 8, offsets, columns).map_err(|e| e.to_string())
         };
         assert!(text(&[0, 2, 3], &[1, 7, 0]).is_ok());

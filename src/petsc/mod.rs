@@ -65,4 +65,4 @@ pub use session::{Session, version};
 pub use shell::{ShellKsp, ShellSystem};
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
 pub use stored::Stored;
-pub use vector::Vector;
+pub use vector::{Index, Vector};

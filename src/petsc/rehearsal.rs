@@ -4,6 +4,7 @@
 //!
 //! The options are copied to a prefix of their own: those of the run stay unread.
 
+use super::vector::Index;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 
@@ -124,11 +125,11 @@ fn rows<const D: usize>(first: usize) -> CoarsestRows {
     for dof in 0..BLOCKS * D {
         for (column, value) in entries(dof / D) {
             for i in 0..D {
-                rows.columns.push(((first + column) * D + i) as i32);
+                rows.columns.push(((first + column) * D + i) as Index);
                 rows.values.push(if i == dof % D { value } else { 0.0 });
             }
         }
-        rows.offsets.push(rows.columns.len() as i32);
+        rows.offsets.push(rows.columns.len() as Index);
     }
     rows
 }

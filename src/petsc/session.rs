@@ -188,7 +188,8 @@ pub fn version() -> String {
     let (mut major, mut minor, mut patch, mut release) = (0, 0, 0, 0);
     // SAFETY: writes four integers; needs no running PETSc.
     unsafe { sys::PetscGetVersionNumber(&mut major, &mut minor, &mut patch, &mut release) };
-    format!("{major}.{minor}.{patch}")
+    let width = if size_of::<super::Index>() == 8 { " with 64-bit indices" } else { "" };
+    format!("{major}.{minor}.{patch}{width}")
 }
 
 #[cfg(test)]

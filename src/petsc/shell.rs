@@ -11,6 +11,7 @@ use super::abort::unless_shared;
 use super::check::{keep, petsc, text_of};
 use super::ksp::{self, Ksp, KspOutcome};
 use super::object::Object;
+use super::vector::DETERMINE;
 use super::vector::{Values, ValuesMut, Vector, index};
 use super::{Matrix, sys};
 use crate::error::Result;
@@ -114,7 +115,7 @@ impl Space {
     fn new(comm: &SimpleCommunicator, rows: usize, entries: Option<Matrix>) -> Result<Self> {
         let (b, x) = (Vector::new(comm, rows, 1)?, Vector::new(comm, rows, 1)?);
         let mut product = Object(null_mut());
-        let (count, all) = (index(rows)?, sys::PETSC_DETERMINE);
+        let (count, all) = (index(rows)?, DETERMINE);
         let nothing = null_mut();
         petsc!(MatCreateShell(comm.as_raw(), count, count, all, all, nothing, &mut product.0))?;
         petsc!(MatSetUp(product.0))?;

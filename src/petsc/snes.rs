@@ -16,7 +16,8 @@ use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
 use super::hierarchy::{self, Hierarchy, Installed};
 use super::ksp::{self, Ranks};
-use super::vector::{Values, ValuesMut, index};
+use super::vector::DEFAULT;
+use super::vector::{Index, Values, ValuesMut, index};
 use super::{BlockProduct, Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
@@ -150,10 +151,10 @@ impl Snes {
 
     /// Most linear solves of the next call of [`Self::solve`].
     pub fn set_max_solves(&mut self, max_solves: usize) -> Result<()> {
-        let default = f64::from(sys::PETSC_DEFAULT);
+        let default = DEFAULT as f64;
         // Step tolerance 0: after a failed line search PETSc would call a tiny step converged.
         let (step, solves) = (0.0, index(max_solves)?);
-        petsc!(SNESSetTolerances(self.raw, default, default, step, solves, i32::MAX))
+        petsc!(SNESSetTolerances(self.raw, default, default, step, solves, Index::MAX))
     }
 
     /// Built-in options under the prefix: pairs such as `("pc_type", "lu")`. The user's win.
@@ -403,10 +404,10 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     context.settle(result, |context, ()| {
         context.renew_levels(inner)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
-        let (mut norm, default) = (0.0, f64::from(sys::PETSC_DEFAULT));
+        let (mut norm, default) = (0.0, DEFAULT as f64);
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;
         let eta = forcing.next(norm, context.problem.excess());
-        petsc!(KSPSetTolerances(inner, eta, default, default, sys::PETSC_DEFAULT))
+        petsc!(KSPSetTolerances(inner, eta, default, default, DEFAULT))
     })
 }
 

@@ -25,7 +25,7 @@ impl Vector {
         let mut vector = Vector { raw: null_mut(), local: local_len };
         petsc!(VecCreate(comm.as_raw(), &mut vector.raw))?;
         petsc!(VecSetBlockSize(vector.raw, block))?;
-        petsc!(VecSetSizes(vector.raw, n, sys::PETSC_DETERMINE))?;
+        petsc!(VecSetSizes(vector.raw, n, DETERMINE))?;
         petsc!(VecSetType(vector.raw, sys::VECSTANDARD.as_ptr().cast()))?;
         petsc!(VecSet(vector.raw, 0.0))?;
         Ok(vector)
@@ -210,12 +210,21 @@ impl Drop for ValuesMut<'_> {
     }
 }
 
-/// A size or number as PETSc's 32-bit integer.
+/// PETSc's integer: numbers of rows and columns over all ranks. 32 bits wide, or 64.
+pub type Index = sys::PetscInt;
+
+/// "PETSc decides", in sizes and in limits; bindgen knows them as 32-bit numbers.
+#[allow(clippy::unnecessary_cast, reason = "where the index has 64 bits it is one")]
+pub(crate) const DETERMINE: Index = sys::PETSC_DETERMINE as Index;
+#[allow(clippy::unnecessary_cast, reason = "as above")]
+pub(crate) const DEFAULT: Index = sys::PETSC_DEFAULT as Index;
+
+/// A size or number as PETSc's integer.
 pub(crate) fn index(value: usize) -> Result<sys::PetscInt> {
     sys::PetscInt::try_from(value).map_err(|_| {
         Error::Environment(format!(
-            "{value} does not fit the 32-bit integers of this PETSc (limit {}); use more ranks, \
-             or a PETSc built with 64-bit indices",
+            "{value} does not fit the integers of this PETSc (limit {}); use more ranks, or a PETSc \
+             built with 64-bit indices",
             sys::PetscInt::MAX
         ))
     })

@@ -4,6 +4,7 @@
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::parallel::{HaloPlan, Partition, World, exchange};
+use crate::petsc::Index;
 
 use super::node_index::{NodeIndex, sort_distinct};
 
@@ -19,7 +20,7 @@ pub struct Numbering {
     /// Local index -> grid node.
     pub nodes: Vec<usize>,
     /// Local index -> global equation number of the node.
-    pub global: Vec<i32>,
+    pub global: Vec<Index>,
     /// Grid node -> local index.
     pub index: NodeIndex,
     /// Owner <-> ghost exchange of nodal values.
@@ -77,9 +78,9 @@ impl Numbering {
         let count = owned.len();
         let offset = world.exclusive_sum(count);
         let total = world.sum_usize(count);
-        if total > i32::MAX as usize / 3 {
+        if total > Index::MAX as usize / 3 {
             return Err(Error::Run(format!(
-                "{total} active nodes need more equations than 32-bit indices can number; \
+                "{total} active nodes need more equations than the indices of this PETSc can number; \
                  use a coarser grid or a PETSc with 64-bit indices"
             )));
         }
@@ -97,7 +98,7 @@ impl Numbering {
             offset,
             total,
             nodes,
-            global: numbers.into_iter().map(|number| number as i32).collect(),
+            global: numbers.into_iter().map(|number| number as Index).collect(),
             index,
             halo,
         })

@@ -3,6 +3,7 @@
 
 use crate::error::Result;
 use crate::parallel::{World, exchange};
+use crate::petsc::Index;
 
 use super::border::Border;
 use super::graph::{Lists, neighbours};
@@ -220,7 +221,7 @@ impl Pattern {
                 .map(|pair| {
                     let row = pair[0] as usize - numbering.offset;
                     let range = self.offsets[row]..self.offsets[row + 1];
-                    let key = pair[1] as i32;
+                    let key = pair[1] as Index;
                     let position = self.columns[range.clone()]
                         .binary_search_by_key(&key, |&c| numbering.global[c as usize])
                         .expect("the owner's row holds every column that was announced");

@@ -3,6 +3,7 @@
 //! taken apart into runs of them, and only the first of each run is stored.
 
 use crate::error::{Error, Result};
+use crate::petsc::Index;
 
 use super::graph::Lists;
 
@@ -34,7 +35,7 @@ impl Places {
         supports: &Lists,
         touched: impl Iterator<Item = (u32, usize, &'a [u32])>,
         rows: &Lists,
-        global: &[i32],
+        global: &[Index],
     ) -> Result<Self> {
         let count = supports.len();
         let mut places = Places {
@@ -107,7 +108,7 @@ impl Places {
 }
 
 /// The longest run, up to three, that the whole support consists of.
-fn run_length(nodes: &[u32], global: &[i32]) -> usize {
+fn run_length(nodes: &[u32], global: &[Index]) -> usize {
     [3, 2]
         .into_iter()
         .find(|&run| {
@@ -127,7 +128,7 @@ mod tests {
 
     #[test]
     fn runs_are_whole() {
-        let global: Vec<i32> = vec![0, 1, 2, 10, 11, 12, 30, 31];
+        let global: Vec<crate::petsc::Index> = vec![0, 1, 2, 10, 11, 12, 30, 31];
         assert_eq!(run_length(&[0, 1, 2, 3, 4, 5], &global), 3);
         assert_eq!(run_length(&[0, 1, 3, 4, 6, 7], &global), 2);
         assert_eq!(run_length(&[0, 1, 3, 5], &global), 1);
