@@ -25,6 +25,7 @@
 //! | material points | [`points`] |
 //! | background lattice or mesh | [`grid`] |
 //! | (d) solvers | [`petsc`] |
+//! | (d) their products by blocks | [`blocks`] |
 //! | small tensors | [`tensor`] |
 //! | `input.toml` | [`deck`] |
 //! | files that a user names, opened with care | [`input_file`] |
@@ -32,6 +33,7 @@
 pub mod amg;
 pub mod analysis;
 pub mod basis;
+pub mod blocks;
 pub mod cli;
 pub mod contact;
 pub mod deck;

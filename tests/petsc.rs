@@ -5,11 +5,10 @@ mod common;
 use common::{on_ranks, on_ranks_with};
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
+use mpm_par::blocks::{Blocks, Half, Stored};
 use mpm_par::error::{Error, Result};
 use mpm_par::petsc::Index;
-use mpm_par::petsc::{
-    self, Blocks, Half, Ksp, Matrix, NewtonProblem, Session, Snes, Stored, Vector, Verdict,
-};
+use mpm_par::petsc::{self, Ksp, Matrix, NewtonProblem, Session, Snes, Vector, Verdict};
 
 /// This rank's rows of a system of `n` rows in blocks of `block`; rank 1 gets none.
 fn share(comm: &SimpleCommunicator, n: usize, block: usize) -> std::ops::Range<usize> {

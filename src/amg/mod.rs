@@ -34,10 +34,11 @@ use crate::petsc::Index;
 use level::{Assembled, Nodes, Rows};
 use symmetric_part::symmetric_part;
 
+use crate::blocks::Stored;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
-use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed, Stored};
+use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed};
 use crate::system::numbering::Numbering;
 
 use aggregate::Aggregates;

@@ -8,14 +8,12 @@ use std::ptr::null_mut;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::AsRaw;
 
-use super::blocks::Blocks;
 use super::check::{keep, petsc};
-use super::half::Half;
 use super::object::Object;
-use super::stored::Stored;
 use super::sys;
 use super::vector::DETERMINE;
 use super::vector::{Index, Values, ValuesMut, index};
+use crate::blocks::{Blocks, Half, Stored};
 use crate::error::{Error, Result};
 use crate::tensor::fused::Block;
 

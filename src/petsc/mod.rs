@@ -12,10 +12,7 @@
 //! | `known.rs` | options no solver knows, told before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
-//! | `blocks.rs` | [`Blocks`]: sparse matrix of small blocks |
-//! | `half.rs` | [`Half`]: the lower half of a symmetric one |
-//! | `stored.rs` | [`Stored`]: single or double precision |
-//! | `block_product.rs` | [`BlockProduct`]: a rank's rows of such a matrix, and PETSc's shell over them |
+//! | `block_product.rs` | [`BlockProduct`]: a rank's rows in blocks ([`crate::blocks`]), and PETSc's shell over them |
 //! | `hierarchy.rs` | [`Hierarchy`]: multigrid's cycle on levels of such matrices |
 //! | `blas.rs` | the kernel that OpenBLAS runs |
 //! | `object.rs` | handles given back when they go out of scope |
@@ -31,11 +28,9 @@
 mod abort;
 pub mod blas;
 mod block_product;
-mod blocks;
 mod check;
 pub mod files;
 mod forcing;
-mod half;
 mod hierarchy;
 pub mod known;
 pub mod ksp;
@@ -47,16 +42,13 @@ mod rehearsal;
 pub mod session;
 mod shell;
 pub mod snes;
-mod stored;
 pub mod sys;
 pub mod vector;
 
 pub use abort::install_panic_hook;
 pub use block_product::BlockProduct;
-pub use blocks::Blocks;
 pub use check::agree;
 pub use forcing::Forcing;
-pub use half::Half;
 pub use hierarchy::{CoarsestRows, Hierarchy, Smoothed};
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
@@ -64,5 +56,4 @@ pub use rehearsal::Rehearsal;
 pub use session::{Session, version};
 pub use shell::{ShellKsp, ShellSystem};
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};
-pub use stored::Stored;
 pub use vector::{Index, Vector};

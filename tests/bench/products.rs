@@ -5,7 +5,7 @@
 use std::sync::Barrier;
 use std::time::Instant;
 
-use mpm_par::petsc::{Blocks, Half};
+use mpm_par::blocks::{Blocks, Half};
 
 /// Unknowns a node, nodes a side, cells that couple.
 type Case = (&'static str, usize, [usize; 3], usize);

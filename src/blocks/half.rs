@@ -199,7 +199,7 @@ impl Half<f64> {
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use super::{AHEAD, BEYOND, Half, Shape, Stored, fetch};
-    use crate::petsc::stored::load;
+    use crate::blocks::stored::load;
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx2,fma")]

@@ -286,7 +286,7 @@ fn store<const R: usize, const ADD: bool>(target: &mut [f64; R], sums: [f64; R])
 #[cfg(target_arch = "x86_64")]
 mod avx2 {
     use super::{AHEAD, BEYOND, Blocks, Shape, Stored, fetch, store};
-    use crate::petsc::stored::load;
+    use crate::blocks::stored::load;
     use std::arch::x86_64::*;
 
     #[target_feature(enable = "avx2,fma")]
