@@ -70,6 +70,66 @@ fn a_penalty_goes_as_deep_as_it_says() {
     }
 }
 
+/// The same with domains that are no boxes, and in space.
+#[test]
+fn every_basis_with_domains_and_both_dimensions_meet_a_surface() {
+    let depth_times_penalty = |results: &Results, contact: &str, force: &str, h: f64| {
+        let pressure = last(results, force) / last(results, &format!("contact.{contact}.area"));
+        last(results, &format!("contact.{contact}.gap_max")) * 1e6 / (pressure * h) * 10.0
+    };
+    for basis in ["cpdi1", "cpdi2"] {
+        let results = Run::text(PRESSED).set(format!("method.basis=\"{basis}\"")).results();
+        let found = depth_times_penalty(&results, "floor-block", "reaction.floor.y", 0.5);
+        assert!((found - 1.0).abs() < 1e-6, "{basis}: {found}");
+    }
+    let results = Run::text(
+        r#"
+[analysis]
+type = "quasi-static"
+steps = 2
+max_iterations = 20
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+origin = [-0.5, -0.5, -0.5]
+size = [2.0, 2.0, 2.0]
+h = 0.5
+[material.rubber]
+model = "hencky"
+young = 1e6
+poisson = 0.0
+[[body]]
+name = "block"
+material = "rubber"
+shape = { box = { min = [0.0, 0.0, 0.0], max = [1.0, 1.0, 1.0] } }
+[[rigid]]
+name = "floor"
+shape = { half_space = { point = [0, 0, 0], normal = [0, 0, 1] } }
+[[rigid]]
+name = "plate"
+shape = { box = { min = [-1, -1, 1], max = [2, 2, 2] } }
+motion = { displacement = [0.02, 0.01, -0.04] }
+[[contact]]
+between = ["floor", "block"]
+friction = 0.3
+[[contact]]
+between = ["plate", "block"]
+friction = "rough"
+"#,
+    )
+    .results();
+    assert!((last(&results, "contact.floor-block.area") - 1.0).abs() < 1e-12);
+    let (floor, plate) = (last(&results, "reaction.floor.z"), last(&results, "reaction.plate.z"));
+    assert!((floor + plate).abs() < 1e-9 * floor, "{floor} {plate}");
+    for axis in ["x", "y"] {
+        let pushed = last(&results, &format!("reaction.plate.{axis}"));
+        let held = last(&results, &format!("reaction.floor.{axis}"));
+        assert!(pushed > 0.0 && (pushed + held).abs() < 1e-9 * floor, "{axis}: {pushed} {held}");
+    }
+    assert!(results.directory.join("rigid-000002.h5").exists());
+}
+
 /// Newton's order between the last residuals above round-off.
 #[test]
 fn newtons_method_converges_quadratically() {
