@@ -75,8 +75,8 @@ impl Surface<3> for Cone {
             std::array::from_fn(|i| {
                 // A disc across the axis reaches r sqrt(1 - a_i^2) along axis i.
                 let wide = self.radius * (1.0 - self.axis[i] * self.axis[i]).max(0.0).sqrt();
-                let top = self.tip[i] + self.height * self.axis[i];
-                sign * (sign * self.tip[i]).max(sign * top + wide)
+                let ring = |along: f64| sign * (self.tip[i] + along * self.axis[i]) + wide;
+                sign * (sign * self.tip[i]).max(ring(self.point)).max(ring(self.height))
             })
         };
         (end(-1.0), end(1.0))

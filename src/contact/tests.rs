@@ -64,7 +64,7 @@ fn normals_and_curvatures_are_those_of_the_distance() {
         &Cone::new([0.1, 0.0, -0.2], unit, 60.0, 0.3, 0.5).expect("a volume"),
     ];
     for surface in space {
-        for x in [[0.33, 0.41, 0.2], [-0.2, 0.05, 0.4], [0.9, -0.8, 0.1], [0.2, 0.13, 0.05]] {
+        for x in [[0.33, 0.41, 0.2], [-0.2, 0.05, 0.37], [0.9, -0.8, 0.1], [0.2, 0.13, 0.05]] {
             require_derivatives(surface, x);
         }
     }

@@ -301,12 +301,12 @@ impl<const D: usize> ContactTerm<D> {
     }
 
     /// Adds N_a N_b `stiffness` A to the rows of a corner's nodes.
-    fn add_block(
+    fn add_block<R: BlockRows<D>>(
         &self,
         of: &Candidate<D>,
         stiffness: &Square<D>,
         pattern: &Pattern,
-        rows: &mut InPlace<'_, D>,
+        rows: &mut R,
     ) {
         for (node, of_a) in self.entries(of) {
             let row = pattern.row_of[node] as usize;
@@ -347,6 +347,25 @@ impl<const D: usize> ContactTerm<D> {
                 pair.name, points.id[of.point]
             )
         })
+    }
+
+    /// Adds this rank's shares of the negative force at an iterate, and its tangent where there are
+    /// `rows`.
+    pub fn add<R: BlockRows<D>>(
+        &self,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        mut rows: Option<&mut R>,
+    ) {
+        for of in self.of_part(part) {
+            let x = self.position(of, at.displacement);
+            let Some((_, response)) = self.respond(of, &x) else { continue };
+            self.add_force_of(of, &response, -1.0, force);
+            if let Some(rows) = rows.as_deref_mut() {
+                self.add_block(of, &response.stiffness, at.pattern, rows);
+            }
+        }
     }
 
     /// What the rigid bodies exert at the step's start, this rank's share.
@@ -439,16 +458,9 @@ impl<const D: usize> Term<D> for &ContactTerm<D> {
         part: Part,
         at: At<'_>,
         force: &mut [f64],
-        mut rows: Option<&mut InPlace<'_, D>>,
+        rows: Option<&mut InPlace<'_, D>>,
     ) -> Health {
-        for of in self.of_part(part) {
-            let x = self.position(of, at.displacement);
-            let Some((_, response)) = self.respond(of, &x) else { continue };
-            self.add_force_of(of, &response, -1.0, force);
-            if let Some(rows) = rows.as_deref_mut() {
-                self.add_block(of, &response.stiffness, at.pattern, rows);
-            }
-        }
+        self.add(part, at, force, rows);
         Health::default()
     }
 
