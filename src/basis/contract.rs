@@ -51,7 +51,7 @@ pub trait Basis<const D: usize> {
         None
     }
 
-    /// Gradients at the centres of cells, for F-bar: one for each entry of `influences`, 1/m.
+    /// Gradients of the cells, for F-bar ([`super::centre`]): one for each entry of `influences`, 1/m.
     fn centre_gradients(
         &self,
         grid: &Grid<D>,
@@ -114,11 +114,11 @@ impl<const D: usize> Basis<D> for Mpm {
 
     fn centre_gradients(
         &self,
-        grid: &Grid<D>,
-        _: &Points<D>,
+        _: &Grid<D>,
+        points: &Points<D>,
         influences: &Influences<D>,
     ) -> Result<Vec<[f64; D]>> {
-        super::centre::of_cells(grid, influences)
+        Ok(super::centre::means(points, influences, &influences.gradients))
     }
 
     fn make_rings(

@@ -9,7 +9,7 @@
 //! | (all) | `contract.rs` | `trait Basis`: what each of them owes |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
-//! | `locking` | `centre.rs` | gradients at the centres of cells, for F-bar |
+//! | `locking` | `centre.rs` | gradients of cells, for F-bar |
 //! | `symmetry` | `radial.rs` | rings: S, its gradient and S/r, weighted by the radius |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
@@ -54,11 +54,11 @@ pub struct Influences<const D: usize> {
     pub weights: Vec<f64>,
     /// 1/m
     pub gradients: Vec<[f64; D]>,
-    /// Gradients at cell centres of the same entries ([`centre`]), 1/m; empty without F-bar.
+    /// Gradients of the cells for the same entries ([`centre`]), 1/m; empty without F-bar.
     pub centre_gradients: Vec<[f64; D]>,
     /// With axisymmetry the hoop row of the same entries ([`radial`]), 1/m: dF_zz - 1 = Σ H u_r.
     pub hoop: Vec<f64>,
-    /// That of F-bar at cell centres, 1/m.
+    /// That of F-bar, 1/m.
     pub centre_hoop: Vec<f64>,
     /// Where the nodes come from, of bases that collect them place by place.
     pub cells: Cells,

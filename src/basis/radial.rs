@@ -17,6 +17,7 @@
 //! For `mpm` the domain is a point, and S = S° = N(x_p). A domain that reaches beyond the axis, by what
 //! its update is off, ends at the axis.
 
+use super::centre;
 use super::contract::Basis;
 use super::gimp::{self, spans};
 use super::product::{Line, for_each_index};
@@ -51,16 +52,13 @@ pub(super) fn turn_points<const D: usize>(
         if !(radius > 0.0) {
             return Err(on_axis(grid, points, p));
         }
-        // The row's nodes are those of the cell, and its centre is the mean of them.
-        let count = row.len() as f64;
-        let centre =
-            row.clone().map(|at| grid.node_position(influences.nodes[at])[0]).sum::<f64>() / count;
         for at in row {
             influences.hoop[at] = influences.weights[at] / radius;
-            if let Some(hoop) = influences.centre_hoop.get_mut(at) {
-                *hoop = 1.0 / (count * centre);
-            }
         }
+    }
+    if !influences.centre_hoop.is_empty() {
+        let hoops: Vec<[f64; 1]> = influences.hoop.iter().map(|hoop| [*hoop]).collect();
+        influences.centre_hoop = centre::means(points, influences, &hoops).into_flattened();
     }
     Ok(())
 }

@@ -262,7 +262,7 @@ pub enum PointVolume {
 pub enum Locking {
     #[default]
     None,
-    /// Stress from dF_bar = (det dF_0 / det dF)^(1/n) dF, dF_0 at the centres of cells.
+    /// Stress from dF_bar = (det dF_0 / det dF)^(1/n) dF, dF_0 that of the cells.
     FBar,
 }
 

@@ -1,5 +1,5 @@
-//! F-bar: dF_bar = (det dF_0 / det dF)^(1/D) dF, the point's distortion with the change of volume at
-//! the centres of cells (de Souza Neto et al. 1996, IJSS 33:3277, eq. 8); in plane strain it acts in
+//! F-bar: dF_bar = (det dF_0 / det dF)^(1/D) dF, the point's distortion with the change of volume of
+//! its cells (de Souza Neto et al. 1996, IJSS 33:3277, eq. 8); in plane strain it acts in
 //! the plane only, where dF_zz = 1 stays. Rings (`ring.rs`) take all three directions.
 //!
 //! The material sees dF_bar: b_e and tau follow from it. Gradients, positions, domains and volumes
@@ -58,7 +58,7 @@ impl<const D: usize> Dilation<D> {
     }
 
     /// r_b = (dF_0^-T G_0b - dF^-T G_b) / D, 1/m, of a node's gradients G_b at the point and G_0b
-    /// at the centres.
+    /// of the cells.
     #[inline]
     pub fn row(&self, gradient: &[f64; D], centre: &[f64; D]) -> [f64; D] {
         std::array::from_fn(|k| {

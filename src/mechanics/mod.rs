@@ -10,7 +10,7 @@
 //! |---|---|
 //! | `mod.rs` | what the assembly sees |
 //! | `update.rs` | trial strain, material, new elastic strain: in principal axes |
-//! | `dilation.rs` | F-bar: the change of volume at the centres of cells |
+//! | `dilation.rs` | F-bar: the change of volume of cells |
 //! | `ring.rs` | what the hoop direction adds with axisymmetry |
 //! | `tangent.rs` | from principal moduli to A_ijkl of a frame |
 

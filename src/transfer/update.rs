@@ -248,7 +248,7 @@ fn require<const D: usize>(
                 format!("is turned inside out (det dF = {determinant:.3e})")
             }
             Fault::Centre => {
-                "is in cells whose centres are turned inside out (det dF_0 <= 0)".to_string()
+                "is in cells that are turned inside out on the mean (det dF_0 <= 0)".to_string()
             }
             Fault::Leaves(way) => format!("leaves the grid {way}"),
         };

@@ -16,6 +16,7 @@ mod energy;
 mod faults;
 mod figure_14;
 mod ghosts;
+mod granular;
 mod implicit;
 mod impulse;
 mod iterations;

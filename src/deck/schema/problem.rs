@@ -128,7 +128,7 @@ pub const SECTIONS: &[Section] = &[
                 "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none).")
                 .read_by(&[GIMP, QUASI_STATIC]),
             key("locking", Choice(Locking::NAMES), Default("\"none\""),
-                "f-bar: stresses from dF with the change of volume at the centres of the cells that a point touches, for Poisson's ratios near 0.5 and plastic flow without change of volume (bases mpm and gimp). The tangent is then unsymmetric. Triangles and tetrahedra gain nothing.")
+                "f-bar: stresses from dF with the change of volume of the cells that a point touches (mpm: the mean of their points; gimp: at their centres), for Poisson's ratios near 0.5 and plastic flow without change of volume (bases mpm and gimp). The tangent is then unsymmetric. Triangles and tetrahedra gain nothing.")
                 .read_by(&[LOADED]),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
                 "State in which equilibrium is written (Lagrangian §3-5).")

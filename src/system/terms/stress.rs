@@ -406,7 +406,7 @@ pub(crate) fn respond_ring<const D: usize>(
     sound(p, increment, &state, health).then_some((contribution, hoop))
 }
 
-/// [`respond`] with F-bar, to dF - 1 and dF_0 - 1 at the centres of cells.
+/// [`respond`] with F-bar, to dF - 1 and dF_0 - 1 of its cells.
 pub(crate) fn respond_averaged<const D: usize>(
     step: StepPoints<'_, D>,
     frame: Frame,
