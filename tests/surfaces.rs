@@ -660,3 +660,68 @@ fn files_that_bound_no_body_are_refused() {
     let outcome = with_file(&SOLID.replace("ball.stl", "none.stl"), "ball.stl", "");
     assert!(outcome.code == 2 && outcome.said().contains("cannot be read"), "{}", outcome.said());
 }
+
+/// A rigid box of twelve facets presses a block as the box does.
+#[test]
+fn a_rigid_body_of_triangles_presses_as_its_form_does() {
+    let deck = |shape: &str| {
+        format!(
+            r#"
+[analysis]
+type = "quasi-static"
+steps = 2
+tolerance = 1e-10
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+size = [3.0, 3.0, 2.0]
+h = 0.5
+[material.soil]
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[body]]
+name = "block"
+material = "soil"
+density = 1000.0
+shape = {{ box = {{ min = [0.5, 0.5, 0.0], max = [2.5, 2.5, 1.5] }} }}
+[[boundary]]
+name = "ground"
+where = {{ side = "back" }}
+fix = ["x", "y", "z"]
+[[rigid]]
+name = "plate"
+shape = {shape}
+motion = {{ displacement = [0, 0, "-0.1*s"] }}
+[[contact]]
+between = ["plate", "block"]
+friction = 0
+[output]
+fields = ["displacement"]
+"#
+        )
+    };
+    let (min, max) = ([0.9, 0.8, 1.5], [2.2, 2.3, 1.9]);
+    let at = |k: usize| -> [f64; 3] {
+        std::array::from_fn(|a| if k >> a & 1 == 0 { min[a] } else { max[a] })
+    };
+    let faces =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let triangles: Vec<[[f64; 3]; 3]> = faces
+        .iter()
+        .flat_map(|[a, b, c, d]| [[at(*a), at(*b), at(*c)], [at(*a), at(*c), at(*d)]])
+        .collect();
+    let form =
+        Run::text(&deck(&format!("{{ box = {{ min = {min:?}, max = {max:?} }} }}"))).results();
+    let outcome = with_file(&deck("{ stl = \"plate.stl\" }"), "plate.stl", &stl(&triangles));
+    assert_eq!(outcome.code, 0, "{}", outcome.said());
+    let solid = outcome.results();
+    let (a, b) = (last(&solid, "reaction.ground.z"), last(&form, "reaction.ground.z"));
+    assert!(a > 1e4 && (a / b - 1.0).abs() < 1e-7, "{a} {b}");
+    let apart = relative_difference(
+        solid.points(2).field("displacement"),
+        form.points(2).field("displacement"),
+    );
+    assert!(apart < 1e-6, "{apart}");
+}

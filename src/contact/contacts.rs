@@ -11,6 +11,7 @@ use super::motion::{Motion, When};
 use super::outline::Outline;
 use super::pose::Pose;
 use super::surface::{Surface, length};
+use super::triangles::Triangles;
 use crate::deck::Deck;
 use crate::deck::model::{self, Basis, RigidShape, Symmetry};
 use crate::error::{Error, Result};
@@ -177,6 +178,7 @@ fn surface<const D: usize>(shape: &RigidShape, rings: bool) -> Option<Box<dyn Su
         }
         RigidShape::Polygon { corners } if rings => of_dimension(Outline::mirrored(corners)?)?,
         RigidShape::Polygon { corners } => of_dimension(Outline::new(corners)?)?,
+        RigidShape::Solid(solid) => of_dimension(Triangles(solid.clone()))?,
         RigidShape::Cone { tip, axis, angle, radius, shaft } => {
             let size = length(axis);
             let axis = axis.map(|a| a / size);

@@ -9,6 +9,7 @@
 //! | `box` | [`Cuboid`](cuboid::Cuboid) | `cuboid.rs` |
 //! | `capsule` | [`Capsule`](capsule::Capsule) | `capsule.rs` |
 //! | `polygon` | [`Outline`](outline::Outline) | `outline.rs` |
+//! | `stl` | [`Triangles`](triangles::Triangles) | `triangles.rs` |
 //! | `cone` | [`Cone`](cone::Cone) | `cone.rs` |
 //! | where a rigid body is | [`Pose`](pose::Pose) | `pose.rs` |
 //! | how it is driven | [`Motion`](motion::Motion) | `motion.rs` |
@@ -39,6 +40,7 @@ pub mod pose;
 pub mod solid;
 pub mod start;
 pub mod surface;
+pub mod triangles;
 
 pub use contacts::{Contacts, Pair, Rigid};
 pub use surface::{Near, Surface};

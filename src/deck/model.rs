@@ -4,10 +4,12 @@
 //! already checked; enums carry the deck's own words in `name()`.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::expression::{Expression, Scope, Variable};
 use super::places::Places;
 use super::shape::Shape;
+use super::solid::Solid;
 use crate::material::Entry;
 
 /// A complete, checked input deck.
@@ -632,6 +634,8 @@ pub enum RigidShape {
     Polygon {
         corners: Vec<[f64; 2]>,
     },
+    /// 3D.
+    Solid(Arc<Solid>),
     /// 3D; `axis` points from the tip into it, `angle` is that at the tip, degrees.
     Cone {
         tip: [f64; 3],

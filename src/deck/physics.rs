@@ -7,7 +7,7 @@
 
 use super::expression::{Expression, Variable};
 use super::model::{
-    AnalysisType, BodySource, Deck, Every, Grid, Load, MeshSource, OnFailure, Output,
+    AnalysisType, BodySource, Deck, Every, Grid, Load, MeshSource, OnFailure, Output, RigidShape,
 };
 use super::resolved::resolved;
 
@@ -50,6 +50,13 @@ pub fn physics(deck: &Deck) -> String {
         && let MeshSource::File(path) = &mut mesh.source
     {
         name_only(path);
+    }
+    for rigid in &mut deck.rigids {
+        if let RigidShape::Solid(solid) = &mut rigid.shape {
+            let mut path = solid.path.clone();
+            name_only(&mut path);
+            *solid = std::sync::Arc::new(solid.renamed(path));
+        }
     }
     for body in &mut deck.bodies {
         match &mut body.source {

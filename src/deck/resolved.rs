@@ -501,6 +501,7 @@ fn rigid_shape(shape: &RigidShape) -> (&'static str, String) {
             "capsule",
             inline(&[("from", vector(from)), ("to", vector(to)), ("radius", number(*radius))]),
         ),
+        RigidShape::Solid(solid) => ("stl", quote(&solid.path.display().to_string())),
         RigidShape::Polygon { corners } => ("polygon", array(corners.iter().map(|x| vector(x)))),
         RigidShape::Cone { tip, axis, angle, radius, shaft } => (
             "cone",

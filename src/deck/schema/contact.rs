@@ -31,6 +31,8 @@ pub const SECTIONS: &[Section] = &[
             key("capsule", Table("rigid.capsule"), Optional("-"), "All within a radius of a segment."),
             key("polygon", Points, Optional("-"),
                 "2D: three or more corners in order; it may have corners that point inwards. In axisymmetry a profile; an edge on the axis x = 0 is no surface.").unit("m"),
+            key("stl", Text, Optional("-"),
+                "3D: an STL file (text or binary, lengths in m) beside the deck, a closed surface whose facets face outward. Held or driven."),
             key("cone", Table("rigid.cone"), Optional("-"), "3D: a cone with a shaft behind it."),
         ],
     },

@@ -1,5 +1,7 @@
 //! `[[rigid]]` and `[[contact]]`.
 
+use std::path::Path;
+
 use super::shapes;
 use crate::deck::model::{
     Boundary, Contact, FreeRigid, Friction, Rigid, RigidMotion, RigidRotation, RigidShape,
@@ -8,11 +10,13 @@ use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::tree::Value;
 
-const FORMS: [&str; 7] = ["half_space", "disc", "ball", "box", "capsule", "polygon", "cone"];
+const FORMS: [&str; 8] = ["half_space", "disc", "ball", "box", "capsule", "polygon", "stl", "cone"];
 
-/// `boundaries`: as read, if that succeeded; their names are taken.
+/// `directory`: where relative paths start; `boundaries`: as read, if that succeeded; their names are
+/// taken.
 pub fn rigids(
     root: &Table<'_>,
+    directory: &Path,
     dimension: usize,
     boundaries: Option<&[Boundary]>,
 ) -> Got<Vec<Rigid>> {
@@ -25,7 +29,7 @@ pub fn rigids(
             return Err(table.problem("name", message));
         }
         names.push(name.clone());
-        let shape = table.table("shape", |t| shape(&t, dimension));
+        let shape = table.table("shape", |t| shape(&t, directory, dimension));
         let motion = table.table_if("motion", |t| motion(&t, dimension));
         let (density, velocity) =
             (table.number_if("density"), table.vector_if("velocity", dimension));
@@ -42,6 +46,10 @@ pub fn rigids(
         if density.is_some() && matches!(shape, RigidShape::HalfSpace { .. }) {
             return Err(table.problem("density", "a half space has no end, and so no mass"));
         }
+        if density.is_some() && matches!(shape, RigidShape::Solid(_)) {
+            let message = "no mass is known of an STL file: a rigid body of one is held or driven";
+            return Err(table.problem("density", message));
+        }
         let free = density.map(|density| FreeRigid {
             density,
             velocity: velocity.unwrap_or_else(|| vec![0.0; dimension]),
@@ -50,9 +58,11 @@ pub fn rigids(
     })
 }
 
-fn shape(table: &Table<'_>, dimension: usize) -> Got<RigidShape> {
+fn shape(table: &Table<'_>, directory: &Path, dimension: usize) -> Got<RigidShape> {
     let form = table.one_of(&FORMS)?;
     match form {
+        "stl" if dimension != 3 => Err(table.problem("stl", "bounds a body in 3D; the grid is 2D")),
+        "stl" => shapes::of_stl(table, directory).map(RigidShape::Solid),
         "polygon" if dimension != 2 => {
             Err(table.problem("polygon", "polygons are 2D; the grid is 3D"))
         }

@@ -76,7 +76,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let names = bodies::names(&root);
     let boundaries = conditions::boundaries(&root, &world, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
-    let rigids = contact::rigids(&root, dimension, boundaries.as_deref().ok());
+    let rigids = contact::rigids(&root, directory, dimension, boundaries.as_deref().ok());
     let contacts = contact::contacts(&root, rigids.as_deref().ok(), &names);
     let verify = results::verify(&root, dimension);
     let probes = probes::probes(&root, dimension, &names);

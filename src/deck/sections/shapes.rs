@@ -75,13 +75,7 @@ fn form(
         "stl" | "terrain" if dimension == 2 => {
             Err(table.problem(name, "bounds a body in 3D; the grid is 2D"))
         }
-        "stl" => {
-            let path = directory.join(table.text("stl")?);
-            let made = content(&path, input_file::DATA)
-                .and_then(|bytes| stl::read(&bytes))
-                .and_then(|triangles| Solid::new(&path, None, triangles));
-            solid(table, "stl", &path, made)
-        }
+        "stl" => of_stl(table, directory).map(Form::Solid),
         "terrain" => table.table(name, |t| {
             let (file, bottom) = (t.text("file"), t.number("bottom"));
             let (path, bottom) = (directory.join(file?), bottom?);
@@ -90,7 +84,7 @@ fn form(
                 .and_then(|text| Heights::read(&text))
                 .and_then(|heights| heights.above(bottom))
                 .and_then(|triangles| Solid::new(&path, Some(bottom), triangles));
-            solid(&t, "file", &path, made)
+            solid(&t, "file", &path, made).map(Form::Solid)
         }),
         "where" => {
             let variables = if dimension == 2 { "x y X Y" } else { "x y z X Y Z" };
@@ -109,14 +103,28 @@ fn form(
     }
 }
 
+/// The solid of the file that key `stl` names.
+pub fn of_stl(table: &Table<'_>, directory: &Path) -> Got<Arc<Solid>> {
+    let path = directory.join(table.text("stl")?);
+    let made = content(&path, input_file::DATA)
+        .and_then(|bytes| stl::read(&bytes))
+        .and_then(|triangles| Solid::new(&path, None, triangles));
+    solid(table, "stl", &path, made)
+}
+
 fn content(path: &Path, most: u64) -> Result<Vec<u8>, String> {
     input_file::read(path, most).map_err(|reason| format!("cannot be read: {reason}"))
 }
 
 /// A solid of a file, or what is wrong with that.
-fn solid(table: &Table<'_>, key: &str, path: &Path, made: Result<Solid, String>) -> Got<Form> {
+fn solid(
+    table: &Table<'_>,
+    key: &str,
+    path: &Path,
+    made: Result<Solid, String>,
+) -> Got<Arc<Solid>> {
     match made {
-        Ok(solid) => Ok(Form::Solid(Arc::new(solid))),
+        Ok(solid) => Ok(Arc::new(solid)),
         Err(why) => Err(table.problem(key, format!("{}: {why}", path.display()))),
     }
 }

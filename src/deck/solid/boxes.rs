@@ -23,6 +23,14 @@ struct Node {
     second: u32,
 }
 
+impl Node {
+    /// Square of the distance of a place outside, m2.
+    fn beyond(&self, x: &Place) -> f64 {
+        let along = |a: usize| (self.min[a] - x[a]).max(x[a] - self.max[a]).max(0.0);
+        (0..3).map(|a| along(a).powi(2)).sum()
+    }
+}
+
 impl Boxes {
     pub fn new(triangles: &[[Place; 3]]) -> Self {
         let mut boxes = Boxes { nodes: Vec::new(), order: (0..triangles.len() as u32).collect() };
@@ -63,6 +71,32 @@ impl Boxes {
     /// Around everything.
     pub fn bounds(&self) -> (Place, Place) {
         self.nodes.first().map_or(([0.0; 3], [0.0; 3]), |node| (node.min, node.max))
+    }
+
+    /// Calls `distance`, which gives the square of the distance from `x`, with triangles of which one
+    /// is the nearest.
+    pub fn nearest(&self, x: &Place, mut distance: impl FnMut(usize) -> f64) {
+        let mut best = f64::INFINITY;
+        let mut stack = vec![0usize];
+        while let Some(index) = stack.pop() {
+            let Some(node) = self.nodes.get(index) else { continue };
+            if node.beyond(x) >= best {
+                continue;
+            }
+            if node.second == 0 {
+                for &triangle in &self.order[node.from as usize..node.to as usize] {
+                    best = best.min(distance(triangle as usize));
+                }
+                continue;
+            }
+            let children = [index + 1, node.second as usize];
+            let far =
+                children.map(|child| self.nodes.get(child).map_or(0.0, |node| node.beyond(x)));
+            // The nearer one is looked at first.
+            let [first, last] =
+                if far[0] <= far[1] { children } else { [children[1], children[0]] };
+            stack.extend([last, first]);
+        }
     }
 
     /// Calls `act` with the triangles in leaves that are `wanted` by their corners.

@@ -7,6 +7,7 @@
 //! | `terrain.rs` | the ground below a grid of heights |
 //! | `closed.rs` | is the surface closed, and do its facets face outward? |
 //! | `meeting.rs` | do facets cut each other? |
+//! | `nearest.rs` | the place of the surface nearest to another |
 //! | `boxes.rs` | a tree of boxes around the triangles |
 //!
 //! A place is inside where its winding number is not zero: the crossings of a ray with the facets,
@@ -16,12 +17,14 @@
 mod boxes;
 mod closed;
 mod meeting;
+mod nearest;
 pub mod stl;
 pub mod terrain;
 
 use std::path::{Path, PathBuf};
 
 use boxes::Boxes;
+pub use nearest::{Feature, Nearest};
 
 use super::crossing::Side;
 
@@ -57,6 +60,12 @@ impl Solid {
         let boxes = Boxes::new(&triangles);
         meeting::require_none(&triangles, &boxes)?;
         Ok(Solid { path: path.to_path_buf(), bottom, triangles, boxes })
+    }
+
+    /// The box between two corners.
+    #[cfg(test)]
+    pub fn cuboid(path: &Path, min: Place, max: Place) -> Self {
+        Solid::new(path, None, tests::cuboid(min, max)).expect("a closed surface")
     }
 
     /// The same as if it had come from another file.
