@@ -152,7 +152,8 @@ fn compare<const D: usize>(
 /// and conditions included.
 fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
     let (model, points) = block::<D>(world, basis, 2, false)?;
-    let span = StepSpan { factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 0.0 };
+    let span =
+        StepSpan { stage: 0, factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 0.0 };
     let mesh = Discretisation::new(world, &model, &points)?;
     let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
     let deck = &model.deck;

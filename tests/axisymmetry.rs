@@ -193,7 +193,8 @@ fn the_tangent_is_the_derivative_of_the_force() {
 fn pressure(world: &World, basis: &str) -> Result<()> {
     let (model, points) = block(world, basis, "none", RUBBER)?;
     let mesh = Discretisation::new(world, &model, &points)?;
-    let term = PressureTerm::new(&model, 1.0, 0.0).expect("the deck has one");
+    let term = PressureTerm::new(&model, deck::When { stage: 0, factor: 1.0, time: 0.0 })
+        .expect("the deck has one");
     let at = rough(&model, &mesh, 0.04, 1.7);
     let along = rough(&model, &mesh, 1.0, 3.1);
     let step = mesh.step_points(&points, &model.materials);

@@ -530,7 +530,8 @@ fn tangent<const D: usize>(world: &World, basis: &str, shape: &str, friction: &s
         |size: f64| -> Vec<f64> { base.iter().zip(&v).map(|(u, v)| 0.02 * u + size * v).collect() };
     let mut touched = [0.0; 2];
     for (factor_start, touched) in [0.0, 0.9].into_iter().zip(&mut touched) {
-        let span = StepSpan { factor_start, factor_end: 1.0, time_start: 0.0, time_end: 1.0 };
+        let span =
+            StepSpan { stage: 0, factor_start, factor_end: 1.0, time_start: 0.0, time_end: 1.0 };
         let term = ContactTerm::new(&model, &mesh, &points, span, &[]).expect("a contact");
         let force = |u: &[f64], mut matrix: Option<&mut BlockMatrix<D>>| {
             let mut force = vec![0.0; count];

@@ -49,7 +49,7 @@ beam.toml:6:1: analysis.tolerence: unknown key \"tolerence\"
    | ^^^^^^^^^
    = did you mean \"tolerance\"?
    = known keys of [analysis]: type, symmetry, steps, duration, cfl, tolerance, max_iterations, on_failure, \
-smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha"
+smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha, strength_tolerance, damping"
     );
 }
 
@@ -64,7 +64,7 @@ beam.toml:29:1: material.steel.density: unknown key \"density\"
     | ^^^^^^^
    = \"density\" belongs to [[body]]
    = known keys of [material.NAME]: model, young, poisson, yield, yield_stress, \
-shear_strength, hardening, saturation, friction, dilation, cohesion, tension, fit, slope, \
+shear_strength, hardening, saturation, softening, friction, dilation, cohesion, tension, fit, slope, \
 compression, swelling, preconsolidation, ocr, elasticity, reference_pressure, shear"
     );
 }
@@ -142,7 +142,7 @@ beam.toml:19:2: gird: unknown key \"gird\"
     |  ^^^^
    = did you mean \"grid\"?
    = known keys of the top level: title, analysis, method, ghost, grid, material, body, boundary, \
-load, rigid, contact, verify, probe, output, parallel, petsc, conditioning, element_test
+load, rigid, contact, water, stage, verify, probe, output, parallel, petsc, conditioning, element_test
 beam.toml: grid: missing section [grid]
    = Background grid."
     );
@@ -198,7 +198,12 @@ fn keys_of_no_effect_are_refused_with_the_choice_that_reads_them() {
         (BEAM, "analysis.newmark_beta", "0.25", "\"implicit-dynamic\" reads it"),
         (BEAM, "body.0.velocity", "[1, 0]", "\"explicit\" or \"implicit-dynamic\" reads it"),
         (BEAM, "ghost.mass_factor", "1.0", "found \"quasi-static\""),
-        (COLLISION, "analysis.tolerance", "1e-6", "\"quasi-static\" or \"implicit-dynamic\" reads"),
+        (
+            COLLISION,
+            "analysis.tolerance",
+            "1e-6",
+            "\"strength-reduction\" or \"implicit-dynamic\" reads",
+        ),
         (COLLISION, "analysis.max_iterations", "7", "found \"explicit\""),
         (COLLISION, "method.frame", "\"total\"", "found \"explicit\""),
         (CUBE, "method.domain_update", "\"corners\"", "method.basis = \"gimp\" reads it, found"),

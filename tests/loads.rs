@@ -230,7 +230,8 @@ fn tangent<const D: usize>(world: &World, basis: &str, pressure: &str) {
     let mesh = Discretisation::new(world, &model, &points).expect("a grid side");
     let (count, pattern) = (mesh.numbering.len() * D, &mesh.pattern);
     let step = mesh.step_points(&points, &model.materials);
-    let term = PressureTerm::new(&model, 1.0, 1.0).expect("a pressure");
+    let term = PressureTerm::new(&model, deck::When { stage: 0, factor: 1.0, time: 1.0 })
+        .expect("a pressure");
     let field =
         |seed: f64| -> Vec<f64> { (0..count).map(|i| (seed + 1.7 * i as f64).sin()).collect() };
     let (base, v, w) = (field(0.3), field(1.1), field(2.2));

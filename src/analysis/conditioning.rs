@@ -49,6 +49,7 @@ pub fn run<const D: usize>(run: &mut Run<D>) -> Result<Ending> {
         run.settle()?;
         let Run { world, model, points, recorder, clock } = &mut *run;
         let span = StepSpan {
+            stage: 0,
             factor_start: (number - 1) as f64 / steps as f64,
             factor_end: number as f64 / steps as f64,
             time_start: 0.0,

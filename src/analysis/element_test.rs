@@ -294,7 +294,8 @@ mod tests {
     use crate::material::entry;
 
     fn made(name: &str, parameters: &[f64]) -> Material {
-        (entry(name).expect("a known model").make)(parameters)
+        let entry = entry(name).expect("a known model");
+        (entry.make)(&entry.completed(parameters))
     }
 
     fn test(path: ElementPath, confining: f64, strain: f64, steps: usize) -> ElementTest {

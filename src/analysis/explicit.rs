@@ -38,7 +38,7 @@ impl<const D: usize> Explicit<D> {
             run.world.fail_together(begun)?;
         }
         let (ledger, limit) = ledger_at_start(run);
-        let steps = TimeSteps::new(&run.model.deck.analysis);
+        let steps = TimeSteps::new(&run.model.deck);
         let (before, solver) = (Snapshot::default(), MassSolver::default());
         let contact = ContactSteps::new(&run.model);
         Ok(Explicit { steps, limit, ledger, before, solver, contact })
@@ -119,6 +119,10 @@ impl<const D: usize> Analysis<D> for Explicit<D> {
             Halt::Refused(refusal) if refusal.cause == Cause::Inverted => unstabilised(model),
             _ => "",
         }
+    }
+
+    fn energy_came(&mut self, energy: f64) {
+        self.ledger.take_in(energy);
     }
 
     fn accept(&mut self, run: &Run<D>, next: Next) -> Moment {

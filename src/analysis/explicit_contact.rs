@@ -3,8 +3,8 @@
 use crate::contact::free::FreeBody;
 use crate::contact::motion::When;
 use crate::contact::pose::Pose;
-use crate::deck::Scope;
 use crate::deck::model::Load;
+use crate::deck::{Presence, Scope};
 use crate::error::Result;
 use crate::loads::Moment;
 use crate::output::restart::run_state::RunState;
@@ -96,7 +96,9 @@ impl<const D: usize> ContactSteps<D> {
 
     /// Of the rigid bodies at a step's end.
     pub fn poses(&self, model: &Model<D>, span: StepSpan) -> Vec<Pose<D>> {
-        let end = When { load_factor: span.factor_end, time: span.time_end };
+        // Rigid bodies are there from the first stage on: s of it, then 1.
+        let end = span.seen_by(Presence::default()).end();
+        let end = When { load_factor: end.factor, time: end.time };
         let driven = model.contacts.poses(end).into_iter();
         driven.zip(&self.free).map(|(pose, body)| body.as_ref().map_or(pose, |b| b.pose)).collect()
     }
@@ -121,7 +123,7 @@ impl<const D: usize> ContactSteps<D> {
 
 /// The deck's gravity at a body's centre, m/s2.
 fn gravity<const D: usize>(model: &Model<D>, body: &FreeBody<D>, span: StepSpan) -> [f64; D] {
-    let at = Moment::new(model.deck.analysis.kind, span.factor_start, span.time_start);
+    let at = Moment::new(model.deck.analysis.kind, Presence::default(), span.start());
     let mut scope = Scope { load_factor: at.load_factor, time: at.time, ..Scope::default() };
     scope.initial[..D].copy_from_slice(&body.pose.centre);
     let mut sum = [0.0; D];

@@ -13,6 +13,8 @@ use crate::system::terms::stress::StepPoints;
 
 use super::explicit_contact::ContactSteps;
 use super::explicit_nodes::{Forces, Motion, Nodes};
+use super::external::add;
+use super::{damping, release};
 use crate::mass::grid_mass::GridMass;
 use crate::mass::light_nodes::LightNodes;
 use crate::mass::solver::MassSolver;
@@ -55,7 +57,7 @@ pub(crate) fn advance<const D: usize>(
     let external = if deck.loads.is_empty() {
         Vec::new()
     } else {
-        model.point_forces(world, points, span.factor_start, span.time_start)?
+        model.point_forces(world, points, span.start())?
     };
     let (mass, light) = clock.time(Phase::Assemble, || {
         let step = mesh.step_points(points, &model.materials);
@@ -63,10 +65,16 @@ pub(crate) fn advance<const D: usize>(
         let light = LightNodes::find(world, &mesh, step, grid.cell_size(), &mut mass)?;
         Ok((mass, light))
     })?;
-    let pressed = match Following::new(model, &mesh, points, span.factor_start, span.time_start) {
+    let mut pressed = match Following::new(model, &mesh, points, span.start()) {
         Some(following) => following.owned_at_start(world, &mesh)?,
         None => Vec::new(),
     };
+    let counter = release::counter_force(model, &mesh, points, (span.stage, span.factor_start));
+    let counter = release::owned(world, &mesh, counter)?;
+    match pressed.is_empty() {
+        true => pressed = counter,
+        false => add(&mut pressed, 1.0, &counter),
+    }
     let borne = supports_at_start(model, &mesh, points, span);
     let mut pushing = contact.begin(world, model, &mesh, points, span)?;
     if let Some(pushing) = &mut pushing {
@@ -90,8 +98,24 @@ pub(crate) fn advance<const D: usize>(
             nodes.forces(points, deformation, clock)?
         }
     };
+    let slowed = match deck.analysis.damping {
+        Some(damping) => {
+            let fixed = &conditions.fixed;
+            damping::deceleration(world, &mesh, damping, fixed, &velocity, &acceleration)?
+        }
+        None => Vec::new(),
+    };
+    for (a, d) in acceleration.iter_mut().zip(&slowed) {
+        *a -= d;
+    }
     for (v, a) in velocity.iter_mut().zip(&acceleration) {
         *v += dt * a;
+    }
+    let mut damped = 0.0;
+    if !slowed.is_empty() {
+        // By the mean velocity of the step.
+        let moved = velocity.iter().zip(&acceleration).map(|(v, a)| dt * (v - 0.5 * dt * a));
+        damped = damping::dissipated(&mass, &mesh, &slowed, moved);
     }
     let step = mesh.step_points(points, &model.materials);
     let Pushed { rate, velocity: new_velocity } =
@@ -158,6 +182,7 @@ pub(crate) fn advance<const D: usize>(
 
     let reaction = at_held(&conditions, &residual);
     let mut row = HistoryRow {
+        stage: span.stage,
         load_factor: span.factor_end,
         time: span.time_end,
         dt,
@@ -173,7 +198,7 @@ pub(crate) fn advance<const D: usize>(
         contact.book(world, touching, &mut row);
     }
     let driven = mass.driven_energy(&mesh, &conditions.increment, dt);
-    let sums = StepSums { energies, ghost, work, driven, overgrown };
+    let sums = StepSums { energies, ghost, work, driven, overgrown, damped };
     let poses = contact.poses(model, span);
     Ok((Solved { row, mesh, displacement, reaction, moved_grid: None, poses }, sums))
 }

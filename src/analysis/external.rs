@@ -3,11 +3,13 @@
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
-use crate::system::conditions::StepSpan;
+use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::following::Following;
 use crate::transfer::mapping;
+
+use super::release::{counter_force, owned, released, releases};
 
 /// External forces of a step, N.
 pub(super) struct Loads<const D: usize> {
@@ -31,12 +33,11 @@ impl<const D: usize> Loads<D> {
         mesh: &Discretisation<D>,
         span: StepSpan,
     ) -> Result<Self> {
-        let points_start = model.point_forces(world, points, span.factor_start, span.time_start)?;
-        let points_end = model.point_forces(world, points, span.factor_end, span.time_end)?;
+        let points_start = model.point_forces(world, points, span.start())?;
+        let points_end = model.point_forces(world, points, span.end())?;
         let mut external_start = owned_forces(world, mesh, &points_start)?;
         let mut nodes_start = Vec::new();
-        let following = Following::new(model, mesh, points, span.factor_start, span.time_start);
-        if let Some(following) = following {
+        if let Some(following) = Following::new(model, mesh, points, span.start()) {
             nodes_start = following.at_start(&mesh.pattern, mesh.numbering.len());
             let mut owned = nodes_start.clone();
             mesh.numbering.halo.reverse_add(world, &mut owned, D)?;
@@ -48,6 +49,39 @@ impl<const D: usize> Loads<D> {
             external_end: owned_forces(world, mesh, &points_end)?,
             points_start,
         })
+    }
+}
+
+impl<const D: usize> Loads<D> {
+    /// Adds what a stage has not yet released ([`super::release`]). Collective.
+    pub fn release(
+        &mut self,
+        world: &World,
+        model: &Model<D>,
+        points: &Points<D>,
+        (mesh, conditions): (&Discretisation<D>, &Conditions),
+        span: StepSpan,
+    ) -> Result<()> {
+        if releases(model, span.stage) {
+            let start = &self.external_start;
+            let (mut force, share) = released(world, model, mesh, points, start, span)?;
+            // What a boundary holds is not out of balance.
+            force
+                .iter_mut()
+                .zip(&conditions.fixed)
+                .filter(|(_, held)| **held)
+                .for_each(|(f, _)| *f = 0.0);
+            add(&mut self.external_start, 1.0, &force);
+            add(&mut self.external_end, share, &force);
+        } else if !model.deck.analysis.kind.is_static() {
+            let at = |factor: f64| counter_force(model, mesh, points, (span.stage, factor));
+            let shares = at(span.factor_start);
+            self.nodes_start.resize(self.nodes_start.len().max(shares.len()), 0.0);
+            add(&mut self.nodes_start, 1.0, &shares);
+            add(&mut self.external_start, 1.0, &owned(world, mesh, shares)?);
+            add(&mut self.external_end, 1.0, &owned(world, mesh, at(span.factor_end))?);
+        }
+        Ok(())
     }
 }
 

@@ -33,7 +33,6 @@ use super::time_loop::{Analysis, Answer, Manner, Next};
 
 /// Both implicit analyses between their steps.
 pub struct Implicit<const D: usize> {
-    steps: usize,
     stepping: Stepping,
     trials: Trials,
     /// Of the quasi-static analysis.
@@ -48,12 +47,9 @@ impl<const D: usize> Implicit<D> {
     pub fn new(run: &Run<D>) -> Self {
         let analysis = &run.model.deck.analysis;
         let dynamic = analysis.kind == AnalysisType::ImplicitDynamic;
-        let steps = analysis.steps.unwrap_or(1);
-        // Without time the load factor serves as the time of formulas.
-        let duration = if dynamic { analysis.duration.unwrap_or(1.0) } else { 1.0 };
+        let (policy, smallest) = (analysis.on_failure, analysis.smallest_step);
         Implicit {
-            steps,
-            stepping: Stepping::new(steps, duration, analysis.on_failure, analysis.smallest_step),
+            stepping: Stepping::new(&run.model.deck.stages, dynamic, policy, smallest),
             trials: Trials::default(),
             totals: Totals::default(),
             contact: ContactTotals::new(run.model.contacts.pairs.len()),
@@ -64,7 +60,7 @@ impl<const D: usize> Implicit<D> {
 
 impl<const D: usize> Analysis<D> for Implicit<D> {
     fn manner(&self) -> Manner {
-        Manner { newton: true, time: self.dynamics.is_some(), steps: Some(self.steps) }
+        Manner { newton: true, time: self.dynamics.is_some(), steps: Some(self.stepping.steps()) }
     }
 
     fn restore(&mut self, state: &RunState) -> Result<()> {
@@ -104,7 +100,8 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)
         })?;
         let (mut loads, left_out) = clock.time(Phase::Assemble, || {
-            let loads = Loads::of_step(world, model, points, &mesh, span)?;
+            let mut loads = Loads::of_step(world, model, points, &mesh, span)?;
+            loads.release(world, model, points, (&mesh, &conditions), span)?;
             Ok((loads, mesh.nodes_left_out(world, model.deck.method.drop_below)))
         })?;
         let contact = clock
@@ -196,6 +193,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         let reaction = at_held(conditions, &supplied);
         let mut row = HistoryRow {
             step: number,
+            stage: span.stage,
             load_factor: span.factor_end,
             newton_iterations: solved.evaluations,
             residual: solved.residual,
@@ -220,7 +218,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         }
         match (&mut self.dynamics, &inertial, &rates) {
             (Some(dynamics), Some(inertial), Some(rates)) => {
-                let sums = inertial.sums(&mesh, conditions, rates, energies, work);
+                let sums = inertial.sums(&mesh, conditions, (rates, &displacement), energies, work);
                 row.time = span.time_end;
                 row.dt = span.time_end - span.time_start;
                 dynamics.book(run, sums, solved.ghost_energy, &mut row)?;
@@ -248,6 +246,12 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         if self.stepping.refuse() { Answer::Smaller } else { Answer::Smallest }
     }
 
+    fn energy_came(&mut self, energy: f64) {
+        if let Some(dynamics) = &mut self.dynamics {
+            dynamics.take_in(energy);
+        }
+    }
+
     fn accept(&mut self, _run: &Run<D>, _next: Next) -> Moment {
         self.stepping.accept()
     }
@@ -266,7 +270,7 @@ fn supports_in_step<const D: usize>(
     inertial: Option<&InertialStep>,
 ) -> Vec<Borne> {
     let Run { model, points, .. } = run;
-    let end = supports(model, mesh, points, (span.factor_end, span.time_end), displacement);
+    let end = supports(model, mesh, points, span.end(), displacement);
     match inertial.map(InertialStep::share_of_start) {
         Some(share) if share > 0.0 => {
             let start = supports_at_start(model, mesh, points, span);
@@ -278,8 +282,9 @@ fn supports_in_step<const D: usize>(
 
 /// The first load step of the deck.
 pub fn first_span(deck: &Deck) -> StepSpan {
-    let factor_end = 1.0 / deck.analysis.steps.unwrap_or(1) as f64;
-    StepSpan { factor_start: 0.0, factor_end, time_start: 0.0, time_end: factor_end }
+    let steps = deck.stages.first().and_then(|stage| stage.steps);
+    let factor_end = 1.0 / steps.unwrap_or(1) as f64;
+    StepSpan { stage: 0, factor_start: 0.0, factor_end, time_start: 0.0, time_end: factor_end }
 }
 
 /// Sums of a quasi-static run so far.

@@ -12,6 +12,7 @@
 //! A boundary's reaction is the mean (1 - γ) r + γ r' of what it supplies at both ends of the step:
 //! Σ m v' - Σ m v = dt (Σ reactions + Σ mean loads) to round-off, as M~ (v' - v) is made of just these.
 
+use crate::deck::model::Damping;
 use crate::error::Result;
 use crate::mass::grid_mass::{GridMass, Inverse};
 use crate::mass::solver::MassSolver;
@@ -33,6 +34,7 @@ use crate::transfer::mapping;
 use crate::transfer::refusal::Halt;
 use crate::transfer::update::PointEnergies;
 
+use super::damping;
 use super::external::{Loads, add};
 use super::newmark::{Newmark, PointRates, Rates};
 use super::time_steps::ledger_at_start;
@@ -52,6 +54,11 @@ impl<const D: usize> Dynamics<D> {
         let (ledger, _) = ledger_at_start(run);
         let (before, solver) = (Snapshot::default(), MassSolver::default());
         Dynamics { ledger, ghost_energy: 0.0, before, solver }
+    }
+
+    /// Bodies have come and gone with this much energy, J.
+    pub fn take_in(&mut self, energy: f64) {
+        self.ledger.take_in(energy);
     }
 
     pub fn save(&self, state: &mut RunState) {
@@ -96,8 +103,17 @@ pub(super) struct InertialStep {
     start: Rates,
     /// Σ m S^T v of the owned degrees of freedom, N s.
     momentum: Vec<f64>,
+    /// Damping, and its decelerations at the step's start.
+    damping: Option<(Damping, Slowing)>,
     /// f_ext - f_int at the start, of the owned degrees of freedom first, N.
     balance_start: Vec<f64>,
+}
+
+/// d of local and of mass-proportional damping at the step's start, local nodes. The former acts on to
+/// the end of the step, the latter follows the velocity.
+struct Slowing {
+    local: Vec<f64>,
+    mass: Vec<f64>,
 }
 
 impl InertialStep {
@@ -124,17 +140,34 @@ impl InertialStep {
             numbering.halo.reverse_add(world, &mut balance, D)?;
             Ok((share, balance))
         })?;
-        let (start, momentum) = clock.time(Phase::Solve, || {
+        let carried = newmark.alpha != 0.0 && span.time_start > 0.0;
+        let (mut start, momentum) = clock.time(Phase::Solve, || {
             let held = held_or_left_out::<D>(conditions, left_out);
             let inverse = mass.inverse(world, &model.grid, mesh, &held, solver)?;
-            let carried = newmark.alpha != 0.0 && span.time_start > 0.0;
             let sums = match carried {
                 false => share_at_start,
                 true => mapping::momentum(step, &points.acceleration, conditions.fixed.len() / D),
             };
             rates_at_start(inverse, step, points, conditions, sums, newmark.dt)
         })?;
-        Ok(InertialStep { newmark, mass, start, momentum, balance_start })
+        let damping = match model.deck.analysis.damping {
+            None => None,
+            Some(damping) => {
+                let one = |damping: Damping| {
+                    let (fixed, Rates { velocity, acceleration }) = (&conditions.fixed, &start);
+                    damping::deceleration(world, mesh, damping, fixed, velocity, acceleration)
+                };
+                let local = one(Damping { mass: 0.0, ..damping })?;
+                let mass = one(Damping { local: 0.0, ..damping })?;
+                if !carried {
+                    // What the forces give is slowed; what comes from the points has been.
+                    add(&mut start.acceleration, -1.0, &local);
+                    add(&mut start.acceleration, -1.0, &mass);
+                }
+                Some((damping, Slowing { local, mass }))
+            }
+        };
+        Ok(InertialStep { newmark, mass, start, momentum, damping, balance_start })
     }
 
     /// The right-hand side of the step's equations, N, of the owned degrees of freedom; and the term
@@ -145,12 +178,19 @@ impl InertialStep {
         loads: &Loads<D>,
     ) -> (Vec<f64>, Vec<Box<dyn Term<D>>>) {
         let newmark = &self.newmark;
-        let mut driving = self.mass.multiply(mesh, &newmark.predictor(&self.start));
+        let (mut owed, mut stiffness) = (newmark.predictor(&self.start), newmark.stiffness());
+        if let Some((damping, slowing)) = &self.damping {
+            add(&mut owed, -1.0, &slowing.local);
+            let still = vec![0.0; owed.len()];
+            add(&mut owed, -damping.mass, &newmark.rates(&self.start, &still).velocity);
+            stiffness += damping.mass * newmark.viscosity();
+        }
+        let mut driving = self.mass.multiply(mesh, &owed);
         let share = 1.0 + newmark.alpha;
         for (dof, force) in driving.iter_mut().enumerate() {
             *force += share * loads.external_end[dof] - newmark.alpha * self.balance_start[dof];
         }
-        let matrix = self.mass.scaled(mesh, newmark.stiffness());
+        let matrix = self.mass.scaled(mesh, stiffness);
         (driving, vec![Box::new(Inertia { share, matrix })])
     }
 
@@ -215,13 +255,22 @@ impl InertialStep {
         &self,
         mesh: &Discretisation<D>,
         conditions: &Conditions,
-        end: &Rates,
+        (end, displacement): (&Rates, &[f64]),
         energies: PointEnergies,
         work: f64,
     ) -> StepSums {
         let ghost = self.mass.ghost_energy(mesh, &end.velocity);
         let driven = self.mass.driven_energy(mesh, &conditions.increment, self.newmark.dt);
-        StepSums { energies, ghost, work, driven, overgrown: 0 }
+        let damped = self.damping.as_ref().map_or(0.0, |(damping, slowing)| {
+            let at_end: Vec<f64> = end.velocity.iter().map(|v| damping.mass * v).collect();
+            let mut mean = self.newmark.mean(&slowing.mass, &at_end);
+            add(&mut mean, 1.0, &slowing.local);
+            for (d, fixed) in mean.iter_mut().zip(&conditions.fixed) {
+                *d = if *fixed { 0.0 } else { *d };
+            }
+            damping::dissipated(&self.mass, mesh, &mean, displacement.iter().copied())
+        });
+        StepSums { energies, ghost, work, driven, overgrown: 0, damped }
     }
 }
 

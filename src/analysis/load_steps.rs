@@ -1,5 +1,6 @@
-//! Load steps in exact fractions: halved when one fails, grown back when they succeed.
+//! Load steps in exact fractions, stage by stage: halved when one fails, grown back when they succeed.
 
+use crate::deck::Stage;
 use crate::deck::model::OnFailure;
 use crate::error::{Error, Result};
 use crate::output::restart::run_state::RunState;
@@ -9,9 +10,7 @@ use crate::system::conditions::StepSpan;
 /// The position in the analysis, counted in ticks so that halving and doubling are exact.
 #[derive(Debug, Clone)]
 pub struct Stepping {
-    steps: usize,
-    /// s over the whole analysis; 0 without time.
-    duration: f64,
+    parts: Vec<Part>,
     ticks_per_step: u64,
     position: u64,
     size: u64,
@@ -20,20 +19,24 @@ pub struct Stepping {
     pub cuts: usize,
 }
 
+/// A stage: its equal steps and its time, s.
+#[derive(Debug, Clone, Copy)]
+struct Part {
+    steps: usize,
+    duration: f64,
+}
+
 impl Stepping {
-    /// `smallest` is the smallest allowed step as a fraction of the nominal one.
-    pub fn new(steps: usize, duration: f64, policy: OnFailure, smallest: f64) -> Self {
+    /// `smallest` is the smallest allowed step as a fraction of the nominal one. Without time the
+    /// load factor serves as the time of formulas: a stage then lasts 1 s.
+    pub fn new(stages: &[Stage], with_time: bool, policy: OnFailure, smallest: f64) -> Self {
+        let duration = |stage: &Stage| stage.duration.filter(|_| with_time).unwrap_or(1.0);
+        let part =
+            |stage: &Stage| Part { steps: stage.steps.unwrap_or(1), duration: duration(stage) };
+        let parts = stages.iter().map(part).collect();
         let halvings = (1.0 / smallest).log2().floor().clamp(0.0, 40.0) as u32;
         let ticks_per_step = 1u64 << halvings;
-        Stepping {
-            steps,
-            duration,
-            ticks_per_step,
-            position: 0,
-            size: ticks_per_step,
-            policy,
-            cuts: 0,
-        }
+        Stepping { parts, ticks_per_step, position: 0, size: ticks_per_step, policy, cuts: 0 }
     }
 
     /// Puts the position into a checkpoint.
@@ -57,18 +60,25 @@ impl Stepping {
 
     /// The next step, `None` when the analysis is complete.
     pub fn next_span(&self) -> Option<StepSpan> {
-        let total = self.total();
-        if self.position >= total {
-            return None;
+        let (mut first, mut begin) = (0, 0.0);
+        for (stage, part) in self.parts.iter().enumerate() {
+            let ticks = part.steps as u64 * self.ticks_per_step;
+            if self.position >= first + ticks {
+                first += ticks;
+                begin += part.duration;
+                continue;
+            }
+            let factor = |position: u64| (position - first) as f64 / ticks as f64;
+            let (start, end) = (factor(self.position), factor(self.position + self.size));
+            return Some(StepSpan {
+                stage,
+                factor_start: start,
+                factor_end: end,
+                time_start: begin + start * part.duration,
+                time_end: begin + end * part.duration,
+            });
         }
-        let factor = |ticks: u64| ticks as f64 / total as f64;
-        let (start, end) = (factor(self.position), factor(self.position + self.size));
-        Some(StepSpan {
-            factor_start: start,
-            factor_end: end,
-            time_start: start * self.duration,
-            time_end: end * self.duration,
-        })
+        None
     }
 
     /// The nominal step, counted from 1, that the next span belongs to.
@@ -107,8 +117,13 @@ impl Stepping {
         (self.position / self.ticks_per_step) as usize
     }
 
+    /// Nominal steps of all stages.
+    pub fn steps(&self) -> usize {
+        self.parts.iter().map(|part| part.steps).sum()
+    }
+
     fn total(&self) -> u64 {
-        self.steps as u64 * self.ticks_per_step
+        self.steps() as u64 * self.ticks_per_step
     }
 }
 
@@ -116,8 +131,34 @@ impl Stepping {
 mod tests {
     use super::*;
 
+    fn stage(steps: usize, duration: f64) -> Stage {
+        let name = String::new();
+        Stage { name, steps: Some(steps), duration: Some(duration), reset_displacement: false }
+    }
+
     fn stepping() -> Stepping {
-        Stepping::new(4, 8.0, OnFailure::Cut, 1.0 / 8.0)
+        Stepping::new(&[stage(4, 8.0)], true, OnFailure::Cut, 1.0 / 8.0)
+    }
+
+    #[test]
+    fn s_runs_from_zero_to_one_in_each_stage() {
+        let stages = [stage(2, 8.0), stage(1, 2.0)];
+        let mut stepping = Stepping::new(&stages, true, OnFailure::Cut, 1.0 / 8.0);
+        assert_eq!(stepping.steps(), 3);
+        let mut ends = Vec::new();
+        stepping.accept();
+        assert!(stepping.refuse());
+        while let Some(span) = stepping.next_span() {
+            ends.push((span.stage, span.factor_start, span.factor_end, span.time_end));
+            stepping.accept();
+        }
+        assert_eq!(ends, [(0, 0.5, 0.75, 6.0), (0, 0.75, 1.0, 8.0), (1, 0.0, 1.0, 10.0)]);
+        let mut still = Stepping::new(&stages, false, OnFailure::Cut, 1.0);
+        for _ in 0..2 {
+            still.accept();
+        }
+        let span = still.next_span().expect("a step");
+        assert_eq!((span.time_start, span.time_end), (1.0, 2.0));
     }
 
     #[test]
@@ -163,7 +204,7 @@ mod tests {
             assert_eq!(other.accept(), stepping.accept());
         }
         assert_eq!(other.next_span(), None);
-        let mut coarse = Stepping::new(4, 8.0, OnFailure::Cut, 0.5);
+        let mut coarse = Stepping::new(&[stage(4, 8.0)], true, OnFailure::Cut, 0.5);
         assert_eq!(coarse.restore(&state).unwrap_err().exit_code(), 3);
     }
 
@@ -171,7 +212,7 @@ mod tests {
     fn the_smallest_step_is_the_last_resort() {
         let mut stepping = stepping();
         assert_eq!((0..10).take_while(|_| stepping.refuse()).count(), 3);
-        let mut stop = Stepping::new(4, 0.0, OnFailure::Stop, 1.0 / 8.0);
+        let mut stop = Stepping::new(&[stage(4, 0.0)], true, OnFailure::Stop, 1.0 / 8.0);
         assert!(!stop.refuse());
     }
 }

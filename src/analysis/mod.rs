@@ -6,8 +6,11 @@
 //! | `quasi-static` | `implicit.rs` | Lagrangian §6.3, 6.5; Ghost §2.4 |
 //! | `explicit` | `explicit.rs`, `explicit_step.rs`, `explicit_nodes.rs` | Ghost §2.3, 3.5 |
 //! | `implicit-dynamic` | `implicit.rs`, `inertial.rs`, `newmark.rs` | Newmark and HHT over Ghost §2.4, 3.3, 3.4 |
+//! | `strength-reduction` | `strength_reduction.rs` | Griffiths, Lane 1999 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
 //! | `element-test` | `element_test.rs` | one point, no grid |
+//! | what comes and goes with a stage | `stage_changes.rs`, `release.rs` | |
+//! | damping of dynamics | `damping.rs` | Cundall 1987 |
 //! | load steps, cut and grown again | `load_steps.rs` | |
 //! | time steps and their stability limit | `time_steps.rs` | Ghost §3.5 |
 //! | Newton's method for a step | `newton.rs`, `convergence.rs` | Lagrangian eq. 26-30, 40 |
@@ -17,6 +20,7 @@
 
 pub mod conditioning;
 pub mod convergence;
+mod damping;
 pub mod element_test;
 pub mod equilibrium;
 pub mod explicit;
@@ -31,7 +35,10 @@ mod inertial;
 pub mod load_steps;
 pub mod newmark;
 pub mod newton;
+mod release;
 pub mod round_off;
 pub mod solver;
+mod stage_changes;
+pub mod strength_reduction;
 pub mod time_loop;
 pub mod time_steps;

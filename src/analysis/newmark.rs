@@ -35,6 +35,11 @@ impl Newmark {
         1.0 / (self.beta * self.dt.powi(2))
     }
 
+    /// Share of u in the velocity at the end, 1/s.
+    pub fn viscosity(&self) -> f64 {
+        self.gamma / (self.beta * self.dt)
+    }
+
     /// Mean over the step of what acts on the velocity, from its values at both ends.
     pub fn mean(&self, start: &[f64], end: &[f64]) -> Vec<f64> {
         let ends = start.iter().zip(end);

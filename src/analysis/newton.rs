@@ -64,7 +64,7 @@ pub fn solve<const D: usize>(
     let numbering = &mesh.numbering;
     let step = mesh.step_points(points, &model.materials);
     let mut problem = clock.time(Phase::Assemble, || {
-        let following = Following::new(model, mesh, points, span.factor_end, span.time_end);
+        let following = Following::new(model, mesh, points, span.end());
         let problem = Equilibrium::new(world, &model.grid, mesh, step, equations, settings(model));
         Ok(problem?.with_following(following, 1.0 + model.deck.analysis.hht_alpha))
     })?;

@@ -249,7 +249,7 @@ pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usiz
     }
     if !matches!(
         model.deck.analysis.kind,
-        AnalysisType::QuasiStatic | AnalysisType::ImplicitDynamic
+        AnalysisType::QuasiStatic | AnalysisType::StrengthReduction | AnalysisType::ImplicitDynamic
     ) {
         return Ok(());
     }

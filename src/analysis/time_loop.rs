@@ -3,6 +3,7 @@
 //! ```text
 //! resume, or write the first frame
 //! while there is a next step:
+//!     if a stage begins with it: bodies come and go
 //!     solve it                      what the analysis gives
 //!     where that fails: undo it; halve it and go on, or leave what the run has and end
 //!     accept it
@@ -23,6 +24,7 @@ use crate::transfer::refusal::Halt;
 use crate::transfer::update;
 
 use super::failure::Failure;
+use super::stage_changes;
 
 /// A step to be solved.
 #[derive(Debug, Clone, Copy)]
@@ -82,6 +84,9 @@ pub trait Analysis<const D: usize> {
         ""
     }
 
+    /// Bodies that came and went with a stage have brought this much energy, J.
+    fn energy_came(&mut self, _energy: f64) {}
+
     /// Moves on after a success. Collective.
     fn accept(&mut self, run: &Run<D>, next: Next) -> Moment;
 
@@ -99,13 +104,20 @@ pub fn run<const D: usize>(run: &mut Run<D>, analysis: &mut impl Analysis<D>) ->
             None
         }
         None => {
+            run.recorder.enter_stage(0);
             run.frame(0, 0.0)?;
             let start = run.model.contacts.poses(When { load_factor: 0.0, time: 0.0 });
             run.recorder.rigid_frame(run.world, &run.model, &start, (0, 0.0))?;
             Some(0)
         }
     };
+    let mut entered = None;
     while let Some(next) = analysis.next() {
+        if entered != Some(next.span.stage) {
+            let gained = stage_changes::enter(run, next.span)?;
+            analysis.energy_came(gained);
+            entered = Some(next.span.stage);
+        }
         let solved = match analysis.step(run, next) {
             Ok(solved) => solved,
             Err(halt) => match halted(run, analysis, next, halt, framed)? {
@@ -166,7 +178,7 @@ fn halted<const D: usize>(
     let completed = analysis.completed();
     if undone && framed != Some(completed) {
         let span = next.span;
-        let written = run.frame(completed, if time { span.time_start } else { span.factor_start });
+        let written = run.frame(completed, span.time_start);
         run.recorder.warn_of_files(written)?;
     }
     let Run { world, model, points, recorder, .. } = run;
@@ -200,7 +212,8 @@ fn finish<const D: usize>(
     moment: Moment,
 ) -> Result<(bool, Option<Ending>)> {
     let (number, manner) = (next.number, analysis.manner());
-    let label = if manner.time { next.span.time_end } else { next.span.factor_end };
+    // Without time it is the load factor, counted on over the stages.
+    let label = next.span.time_end;
     let framed = moment != Moment::PartOfStep
         && run.recorder.wants_frame(number, label, moment == Moment::End);
     if framed {

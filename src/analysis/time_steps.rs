@@ -8,7 +8,8 @@
 //! The penalty of a contact adds to the stiffness of the outermost cells.
 //! `type = "conditioning"` gives the limit of the true eigenvalues for any position.
 
-use crate::deck::model::{Analysis, Mass};
+use crate::deck::model::Mass;
+use crate::deck::{Deck, Stage};
 use crate::error::Result;
 use crate::material::local;
 use crate::output::restart::run_state::RunState;
@@ -25,19 +26,17 @@ use crate::transfer::update;
 /// Where a run stands in time.
 #[derive(Debug, Clone)]
 pub struct TimeSteps {
-    duration: f64,
-    steps: Option<usize>,
+    stages: Vec<Stage>,
     cfl: f64,
     done: usize,
     time: f64,
 }
 
 impl TimeSteps {
-    pub fn new(analysis: &Analysis) -> Self {
+    pub fn new(deck: &Deck) -> Self {
         TimeSteps {
-            duration: analysis.duration.unwrap_or(1.0),
-            steps: analysis.steps,
-            cfl: analysis.cfl.unwrap_or(1.0),
+            stages: deck.stages.clone(),
+            cfl: deck.analysis.cfl.unwrap_or(1.0),
             done: 0,
             time: 0.0,
         }
@@ -58,7 +57,7 @@ impl TimeSteps {
 
     /// True where the steps follow the stability limit.
     pub fn follows_limit(&self) -> bool {
-        self.steps.is_none()
+        self.stages.iter().any(|stage| stage.steps.is_none())
     }
 
     /// Number of the next step, from 1.
@@ -68,29 +67,37 @@ impl TimeSteps {
 
     /// The next step; `limit` is read where the steps follow it. `None` at the end.
     pub fn next(&self, limit: f64) -> Option<StepSpan> {
-        let (start, end) = match self.steps {
-            Some(steps) if self.done < steps => {
-                let at = |step: usize| self.duration * (step as f64 / steps as f64);
-                (at(self.done), at(self.done + 1))
-            }
-            Some(_) => return None,
-            None => {
-                let left = self.duration - self.time;
-                if left <= 1e-12 * self.duration {
-                    return None;
+        let (mut first, mut begin) = (0, 0.0);
+        for (index, stage) in self.stages.iter().enumerate() {
+            let duration = stage.duration.unwrap_or(1.0);
+            // Of the stage, from its begin.
+            let (start, end) = match stage.steps {
+                Some(steps) if self.done < first + steps => {
+                    let at = |step: usize| duration * (step as f64 / steps as f64);
+                    (at(self.done - first), at(self.done - first + 1))
                 }
-                // Equal steps to the end, as long as the limit stays what it is.
-                let count = (left / (self.cfl * limit)).ceil().max(1.0);
-                let end = if count == 1.0 { self.duration } else { self.time + left / count };
-                (self.time, end)
-            }
-        };
-        Some(StepSpan {
-            factor_start: start / self.duration,
-            factor_end: end / self.duration,
-            time_start: start,
-            time_end: end,
-        })
+                None if begin + duration - self.time > 1e-12 * (begin + duration) => {
+                    let start = (self.time - begin).max(0.0);
+                    let left = duration - start;
+                    // Equal steps to the end, as long as the limit stays what it is.
+                    let count = (left / (self.cfl * limit)).ceil().max(1.0);
+                    (start, if count == 1.0 { duration } else { start + left / count })
+                }
+                _ => {
+                    first += stage.steps.unwrap_or(0);
+                    begin += duration;
+                    continue;
+                }
+            };
+            return Some(StepSpan {
+                stage: index,
+                factor_start: start / duration,
+                factor_end: end / duration,
+                time_start: begin + start,
+                time_end: begin + end,
+            });
+        }
+        None
     }
 
     /// Moves on behind `span`.

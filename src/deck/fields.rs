@@ -53,25 +53,42 @@ const fn field(
 
 /// Fields of every point that can be written; scalars, vector fields and components can be verified.
 pub const FIELDS: &[Field] = &[
-    field("displacement", FieldRank::Vector, "m", "x - X"),
+    field(
+        "displacement",
+        FieldRank::Vector,
+        "m",
+        "x - X; from the start of the last stage with reset_displacement",
+    ),
     field("position", FieldRank::Vector, "m", "x, at the end of the step"),
     field("position_initial", FieldRank::Vector, "m", "X, at the start of the run"),
     field("velocity", FieldRank::Vector, "m/s", ""),
     field("acceleration", FieldRank::Vector, "m/s2", "Of implicit dynamics"),
-    field("stress", FieldRank::Symmetric, "Pa", "Cauchy stress, tension positive"),
-    field("kirchhoff_stress", FieldRank::Symmetric, "Pa", "J times the Cauchy stress"),
+    field(
+        "stress",
+        FieldRank::Symmetric,
+        "Pa",
+        "Cauchy stress, tension positive; with [water] the total one",
+    ),
+    field(
+        "effective_stress",
+        FieldRank::Symmetric,
+        "Pa",
+        "Cauchy stress of the material, tension positive: stress + pore_pressure",
+    ),
+    field("pore_pressure", FieldRank::Scalar, "Pa", "Of [water], compression positive"),
+    field("kirchhoff_stress", FieldRank::Symmetric, "Pa", "J times the effective stress"),
     field(
         "principal_stress",
         FieldRank::Principal,
         "Pa",
-        "Principal Cauchy stresses, tension positive, the largest first",
+        "Principal values of stress, tension positive, the largest first",
     ),
     field("pressure", FieldRank::Scalar, "Pa", "-tr(stress)/3, compression positive"),
     field(
         "p",
         FieldRank::Scalar,
         "Pa",
-        "Mean stress of soil mechanics: pressure by its other name",
+        "Mean effective stress of soil mechanics, compression positive: without water the pressure",
     ),
     field(
         "q",
@@ -84,7 +101,7 @@ pub const FIELDS: &[Field] = &[
         "mobilised_friction",
         FieldRank::Scalar,
         "degrees",
-        "asin((s1 - s3)/(-s1 - s3)): friction angle that cohesionless material would need; 90 in tension",
+        "asin((s1 - s3)/(-s1 - s3)) of the effective stress: friction angle that cohesionless material would need; 90 in tension",
     ),
     field(
         "deviatoric_radius",

@@ -14,11 +14,12 @@ const BASES: [(&str, &str); 4] = [
 ];
 
 /// The same for analyses.
-const ANALYSES: [(&str, &str); 5] = [
+const ANALYSES: [(&str, &str); 6] = [
     ("quasi-static", "equilibrium under loads that grow in steps (Newton)"),
     ("explicit", "dynamics in small steps, for impact and fast flow"),
     ("implicit-dynamic", "dynamics in steps that a wave may cross (Newmark, Newton)"),
     ("conditioning", "rigid motion over the grid: condition numbers, nothing solved"),
+    ("strength-reduction", "a factor of safety: strength is divided until nothing stands"),
     ("element-test", "one point under a laboratory path, without grid"),
 ];
 
@@ -45,6 +46,7 @@ pub fn list() -> String {
     let loads: Vec<(&str, &str)> = schema::section("load")
         .keys
         .iter()
+        .filter(|key| !["from", "until"].contains(&key.name))
         .map(|key| (key.name, first_sentence(key.doc)))
         .collect();
     part("loads ([[load]])", pairs(&loads));

@@ -3,6 +3,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `model.rs` | the checked deck as typed data |
+//! | `stage.rs` | stages, and what is there in which of them |
 //! | `words.rs`, `fields.rs` | the deck's words for enumerations and point fields |
 //! | `schema/` | every key once: type, unit, default, range, meaning |
 //! | `tree.rs` | TOML to values with their places; `--set` |
@@ -38,6 +39,7 @@ pub mod schema;
 mod sections;
 pub mod shape;
 pub mod solid;
+pub mod stage;
 pub mod templates;
 mod tree;
 mod unread;
@@ -52,6 +54,7 @@ pub use places::Places;
 pub use problems::{figure, nearest, rough};
 pub use resolved::resolved;
 pub use shape::Shape;
+pub use stage::{Presence, Stage, When};
 pub use unread::is_read;
 
 use crate::error::{Error, Result};

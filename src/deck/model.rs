@@ -10,7 +10,8 @@ use super::expression::{Expression, Scope, Variable};
 use super::places::Places;
 use super::shape::Shape;
 use super::solid::Solid;
-use crate::material::Entry;
+use super::stage::{Presence, Stage};
+use crate::material::{Entry, Parameter};
 
 /// A complete, checked input deck.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,6 +22,8 @@ pub struct Deck {
     /// Folder of the deck: relative paths inside it start here.
     pub directory: PathBuf,
     pub analysis: Analysis,
+    /// In order, at least one. `analysis.steps` and `analysis.duration` are their sums.
+    pub stages: Vec<Stage>,
     pub method: Method,
     /// What is in force; `None`: nothing is stabilised.
     pub ghost: Option<Ghost>,
@@ -29,6 +32,8 @@ pub struct Deck {
     pub bodies: Vec<Body>,
     pub boundaries: Vec<Boundary>,
     pub loads: Vec<Load>,
+    /// When each load acts, in their order.
+    pub load_presence: Vec<Presence>,
     pub rigids: Vec<Rigid>,
     pub contacts: Vec<Contact>,
     pub verify: Vec<Verify>,
@@ -69,6 +74,27 @@ impl Boundary {
 }
 
 impl Deck {
+    /// Whether the deck names stages.
+    pub fn is_staged(&self) -> bool {
+        self.stages.iter().any(|stage| !stage.name.is_empty())
+    }
+
+    /// `[water]`
+    pub fn water(&self) -> Option<Water> {
+        self.loads.iter().find_map(|load| match load {
+            Load::Water(water) => Some(*water),
+            _ => None,
+        })
+    }
+
+    /// Whether a body comes after the start or goes before the end.
+    pub fn has_passing_bodies(&self) -> bool {
+        let passes = |body: &Body| {
+            body.presence.from.is_some_and(|from| from > 0) || body.presence.until.is_some()
+        };
+        self.bodies.iter().any(passes)
+    }
+
     /// The files that the deck names: points of bodies, the mesh.
     pub fn files(&self) -> Vec<PathBuf> {
         let points = self.bodies.iter().filter_map(|body| match &body.source {
@@ -89,10 +115,17 @@ pub enum AnalysisType {
     Explicit,
     ImplicitDynamic,
     Conditioning,
+    /// Quasi-static, then with less and less strength.
+    StrengthReduction,
     ElementTest,
 }
 
 impl AnalysisType {
+    /// Whether forces are in balance at the end of every step.
+    pub fn is_static(self) -> bool {
+        matches!(self, AnalysisType::QuasiStatic | AnalysisType::StrengthReduction)
+    }
+
     /// Whether there is a time `t`, or only the load factor `s`.
     pub fn has_time(self) -> bool {
         matches!(self, AnalysisType::Explicit | AnalysisType::ImplicitDynamic)
@@ -175,6 +208,19 @@ pub struct Analysis {
     pub newmark_beta: f64,
     pub newmark_gamma: f64,
     pub hht_alpha: f64,
+    /// Strength reduction: width of the bracket around the factor, relative.
+    pub strength_tolerance: f64,
+    /// Of dynamics.
+    pub damping: Option<Damping>,
+}
+
+/// What slows the nodes of a dynamic run down beside the materials.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Damping {
+    /// Share of the out-of-balance force that acts against the velocity, component by component.
+    pub local: f64,
+    /// Force against the velocity per momentum, 1/s.
+    pub mass: f64,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -408,6 +454,8 @@ pub struct Material {
     /// One per parameter of the model: a number or a formula of X, Y, Z; `None` where the deck
     /// leaves it out.
     pub parameters: Vec<Option<Expression>>,
+    /// Size of the grid's cells, m: how wide a band of softening material is. 0 without a grid.
+    pub cell: f64,
 }
 
 impl Material {
@@ -421,15 +469,58 @@ impl Material {
         (self.model.make)(&self.values(scope))
     }
 
-    /// The parameters at a place, in the order of the model's.
+    /// Whether the model has a strength that can be reduced.
+    pub fn has_strength(&self) -> bool {
+        let mut given = self.model.parameters.iter().zip(&self.parameters);
+        given.any(|(known, value)| value.is_some() && strength_of(known.key).is_some())
+    }
+
+    /// Divides the strength among `values`, in the order of the model's parameters, by a factor:
+    /// stresses, and tangents of angles.
+    pub fn weaken(&self, values: &mut [f64], factor: f64) {
+        for (known, value) in self.model.parameters.iter().zip(values) {
+            match strength_of(known.key) {
+                Some(Strength::Stress) => *value /= factor,
+                Some(Strength::Angle) => {
+                    *value = (value.to_radians().tan() / factor).atan().to_degrees();
+                }
+                None => {}
+            }
+        }
+    }
+
+    /// The parameters at a place, in the order of the model's; the strain of softening is brought from
+    /// its length to the grid's cells.
     pub fn values(&self, scope: &Scope) -> Vec<f64> {
         let given = self.parameters.iter().zip(self.model.parameters);
-        given
-            .map(|(value, known)| match value {
-                Some(value) => value.value(scope),
-                None => known.value_if_absent(),
-            })
-            .collect()
+        let value = |(value, known): (&Option<Expression>, &Parameter)| match value {
+            Some(value) => value.value(scope),
+            None => known.value_if_absent(),
+        };
+        let mut values: Vec<f64> = given.map(value).collect();
+        let place = |key: &str| self.model.parameters.iter().position(|known| known.key == key);
+        if let (Some(strain), Some(length)) = (place("softening.strain"), place("softening.length"))
+            && self.cell > 0.0
+        {
+            values[strain] *= values[length] / self.cell;
+        }
+        values
+    }
+}
+
+enum Strength {
+    Stress,
+    Angle,
+}
+
+/// What a key of a material is to a strength reduction.
+fn strength_of(key: &str) -> Option<Strength> {
+    match key.rsplit('.').next().unwrap_or(key) {
+        "cohesion" | "tension" | "shear_strength" | "yield" | "yield_stress" => {
+            Some(Strength::Stress)
+        }
+        "friction" | "dilation" => Some(Strength::Angle),
+        _ => None,
     }
 }
 
@@ -445,6 +536,32 @@ pub struct Body {
     pub velocity: Vec<Expression>,
     /// `overlap = "allow"`: it may lie where another body lies.
     pub may_overlap: bool,
+    pub initial_stress: Option<InitialStress>,
+    pub presence: Presence,
+}
+
+/// Effective Cauchy stress of a body before the first step, Pa, tension positive.
+#[derive(Debug, Clone, PartialEq)]
+pub enum InitialStress {
+    /// xx, yy, zz, xy, yz, xz: expressions of X, Y, Z.
+    Components(Box<[Expression; 6]>),
+    /// Weight of what lies above, and a share of it to the sides.
+    K0(Box<K0>),
+}
+
+/// Expressions of X, Y, Z, but for the axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct K0 {
+    /// N/m3, saturated where there is water.
+    pub unit_weight: Expression,
+    /// Height of the surface along the axis, m.
+    pub surface: Expression,
+    /// Horizontal over vertical effective stress.
+    pub k0: Expression,
+    /// On the surface, Pa.
+    pub surcharge: Expression,
+    /// The vertical one.
+    pub axis: usize,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -484,6 +601,7 @@ pub struct Boundary {
     pub displacement: Vec<(usize, Expression)>,
     /// Total rigid rotation over the analysis.
     pub rotation: Option<Rotation>,
+    pub presence: Presence,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -565,12 +683,40 @@ pub enum Load {
     SurfacePressure { surface: BodySurface, value: Expression },
     /// Pa per initial area, expressions of X, Y, Z, s, t: a traction on a body's own surface.
     Traction { surface: BodySurface, value: Vec<Expression> },
+    /// Given pore water, of `[water]`: it lifts what is below its level.
+    Water(Water),
     /// Body force (N per initial volume) that makes this displacement field exact: one expression
     /// per axis of X, Y, Z, s (manufactured solution).
     Manufactured(Vec<Expression>),
 }
 
 impl Load {
+    /// Whether a value of it depends on s or t.
+    pub fn depends_on_time(&self) -> bool {
+        match self {
+            Load::Pressure { value, .. } | Load::SurfacePressure { value, .. } => {
+                value.depends_on_time()
+            }
+            Load::Point { force: all, .. }
+            | Load::Gravity(all)
+            | Load::Traction { value: all, .. }
+            | Load::BodyForce(all)
+            | Load::Manufactured(all) => all.iter().any(Expression::depends_on_time),
+            Load::Water(_) => false,
+        }
+    }
+
+    /// The body that it acts on alone.
+    pub fn body(&self) -> Option<usize> {
+        match self {
+            Load::Point { body, .. } => Some(*body),
+            Load::Traction { surface, .. } | Load::SurfacePressure { surface, .. } => {
+                Some(surface.body)
+            }
+            _ => None,
+        }
+    }
+
     /// Whether it may resist a motion along an axis: a pressure that varies along it.
     pub fn may_hold(&self, axis: usize) -> bool {
         const PLACE: [Variable; 3] = [Variable::CurrentX, Variable::CurrentY, Variable::CurrentZ];
@@ -578,6 +724,24 @@ impl Load {
             Load::Pressure { value, zone } => zone.is_some() || value.depends_on(PLACE[axis]),
             _ => false,
         }
+    }
+}
+
+/// Still water in the pores and around the bodies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Water {
+    /// m, along the axis.
+    pub level: f64,
+    /// N/m3
+    pub unit_weight: f64,
+    /// The vertical one.
+    pub axis: usize,
+}
+
+impl Water {
+    /// p = unit_weight (level - height), 0 above, Pa.
+    pub fn pressure(&self, x: &[f64]) -> f64 {
+        self.unit_weight * (self.level - x[self.axis]).max(0.0)
     }
 }
 

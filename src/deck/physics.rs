@@ -3,13 +3,75 @@
 //! Left out: title, output, verify, parallel, PETSc options, and how hard the solver tries
 //! (tolerance, iterations, what happens on failure): these may change between the parts of a run.
 //! A dynamic run may also be extended, as long as nothing in its deck is a total over the whole
-//! analysis: then its time step counts, and not how many steps there are.
+//! analysis: then its time step counts, and not how many steps there are. A run of stages may be
+//! extended by further ones, and by what comes with them.
 
 use super::expression::{Expression, Variable};
 use super::model::{
     AnalysisType, BodySource, Deck, Every, Grid, Load, MeshSource, OnFailure, Output, RigidShape,
 };
 use super::resolved::resolved;
+use super::stage::Presence;
+
+/// What a continued run must share with the run it continues: of a deck with stages, with as many of
+/// them as that one had.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Physics {
+    /// Of the first stage alone, the first two, and so on.
+    texts: Vec<String>,
+}
+
+impl Physics {
+    pub fn of(deck: &Deck) -> Self {
+        let first = if deck.is_staged() { 1 } else { deck.stages.len().max(1) };
+        let counts = first..=deck.stages.len().max(1);
+        Physics { texts: counts.map(|count| physics(&first_stages(deck, count))).collect() }
+    }
+
+    /// Adds a line that is about no stage.
+    pub fn push_line(&mut self, line: &str) {
+        for text in &mut self.texts {
+            text.push('\n');
+            text.push_str(line);
+        }
+    }
+
+    /// Of the whole deck.
+    pub fn whole(&self) -> &str {
+        self.texts.last().map_or("", String::as_str)
+    }
+
+    /// What the `other` text is to be compared with.
+    pub fn beside(&self, other: &str) -> &str {
+        let stages = other.lines().filter(|line| *line == "[[stage]]").count();
+        stages.checked_sub(1).and_then(|at| self.texts.get(at)).map_or(self.whole(), String::as_str)
+    }
+}
+
+/// The deck without the stages from `count` on, and without what comes with those. Bodies stay where
+/// others follow that do not go: points know bodies by their index.
+fn first_stages(deck: &Deck, count: usize) -> Deck {
+    let mut deck = deck.clone();
+    if count >= deck.stages.len() {
+        return deck;
+    }
+    let later = |presence: &Presence| presence.from.is_some_and(|from| from >= count);
+    deck.stages.truncate(count);
+    deck.analysis.steps = deck.stages.iter().map(|stage| stage.steps).sum();
+    deck.analysis.duration = deck.stages.iter().map(|stage| stage.duration).sum();
+    while deck.bodies.last().is_some_and(|body| later(&body.presence)) {
+        deck.bodies.pop();
+    }
+    deck.boundaries.retain(|boundary| !later(&boundary.presence));
+    let loads = std::mem::take(&mut deck.loads).into_iter().zip(deck.load_presence);
+    (deck.loads, deck.load_presence) = loads.filter(|(_, presence)| !later(presence)).unzip();
+    let bodies = deck.bodies.iter_mut().map(|body| &mut body.presence);
+    let boundaries = deck.boundaries.iter_mut().map(|boundary| &mut boundary.presence);
+    for presence in bodies.chain(boundaries).chain(&mut deck.load_presence) {
+        presence.until = presence.until.filter(|until| *until < count);
+    }
+    deck
+}
 
 /// The resolved deck without what may change. Files are named without their folder, so that a
 /// deck may move.
@@ -29,7 +91,7 @@ pub fn physics(deck: &Deck) -> String {
         report: false,
     };
     let mut time_step = String::new();
-    if may_be_extended(&deck) {
+    if !deck.is_staged() && may_be_extended(&deck) {
         if let (Some(steps), Some(duration)) = (deck.analysis.steps, deck.analysis.duration) {
             // 0.3/30 and 0.5/50 differ in the last bit.
             time_step = format!("time step = {:.12e} s\n", duration / steps as f64);
@@ -85,6 +147,7 @@ fn may_be_extended(deck: &Deck) -> bool {
         .iter()
         .any(|boundary| boundary.rotation.is_some() || boundary.displacement.iter().any(total));
     let load_totals = deck.loads.iter().any(|load| match load {
+        Load::Water(_) => false,
         Load::Pressure { value, .. } | Load::SurfacePressure { value, .. } => of_factor(value),
         Load::Point { force: all, .. }
         | Load::Gravity(all)
@@ -229,6 +292,25 @@ mod tests {
         assert_eq!(steps, Some(("steps = 51".into(), "steps = 50".into())));
         // Ghost was off where nothing was said.
         assert!(difference_from_format_1(&theirs, &of(&[])).is_some());
+    }
+
+    #[test]
+    fn a_run_may_be_extended_by_further_stages() {
+        let staged = |more: &str, until: &str| {
+            let text = reference::EXAMPLE.replacen("steps = 50\n", "", 1);
+            let text = text.replacen("[[load]]\n", &format!("[[load]]\n{until}"), 1);
+            let text = format!("{text}\n[[stage]]\nname = \"a\"\nsteps = 3\n{more}");
+            Physics::of(&read(Path::new("deck.toml"), &text, &[]).unwrap())
+        };
+        let more =
+            "[[stage]]\nname = \"b\"\nsteps = 2\n[[load]]\nbody_force = [1, 0]\nfrom = \"b\"\n";
+        let (short, long) = (staged("", ""), staged(more, "until = \"b\"\n"));
+        assert_ne!(short.whole(), long.whole());
+        assert_eq!(difference(short.whole(), long.beside(short.whole())), None);
+        // What was in the stages that are done must stay.
+        let other = staged(&more.replace("from = \"b\"\n", ""), "");
+        assert!(difference(short.whole(), other.beside(short.whole())).is_some());
+        assert!(difference(long.whole(), short.beside(long.whole())).is_some());
     }
 
     #[test]

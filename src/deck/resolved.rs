@@ -2,11 +2,13 @@
 
 use super::expression::Expression;
 use super::model::{
-    BodySource, BodySurface, Boundary, Deck, ElementTest, Every, Friction, Grid, Held, Load,
-    Material, MeshMotion, MeshSource, Place, RigidMotion, RigidShape, Seeding, Spot, Support,
+    BodySource, BodySurface, Boundary, Deck, ElementTest, Every, Friction, Grid, Held,
+    InitialStress, Load, Material, MeshMotion, MeshSource, Place, RigidMotion, RigidShape, Seeding,
+    Spot, Support,
 };
 use super::schema::{self, AXES, SIDES};
 use super::shape::{Form, Shape};
+use super::stage::Presence;
 use super::unread::is_read;
 
 /// TOML of `deck` with all defaults. Relative paths have become absolute ones.
@@ -19,6 +21,7 @@ pub fn resolved(deck: &Deck) -> String {
     }
     analysis(&mut w, deck);
     if deck.element_test.is_none() {
+        stages(&mut w, deck);
         grid(&mut w, deck);
     }
     materials_and_bodies(&mut w, deck);
@@ -116,8 +119,10 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     w.table("[analysis]");
     w.line("analysis", "type", quote(a.kind.name()));
     w.line("analysis", "symmetry", quote(a.symmetry.name()));
-    w.optional("analysis", "steps", a.steps.map(|steps| steps.to_string()));
-    w.optional("analysis", "duration", a.duration.map(number));
+    if !deck.is_staged() {
+        w.optional("analysis", "steps", a.steps.map(|steps| steps.to_string()));
+        w.optional("analysis", "duration", a.duration.map(number));
+    }
     w.optional("analysis", "cfl", a.cfl.map(number));
     w.line("analysis", "tolerance", number(a.tolerance));
     w.line("analysis", "max_iterations", a.max_iterations.to_string());
@@ -128,6 +133,11 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     w.line("analysis", "newmark_beta", number(a.newmark_beta));
     w.line("analysis", "newmark_gamma", number(a.newmark_gamma));
     w.line("analysis", "hht_alpha", number(a.hht_alpha));
+    w.line("analysis", "strength_tolerance", number(a.strength_tolerance));
+    let damping = a
+        .damping
+        .map(|damping| inline(&[("local", number(damping.local)), ("mass", number(damping.mass))]));
+    w.optional("analysis", "damping", damping);
 
     if deck.element_test.is_some() {
         return;
@@ -167,6 +177,52 @@ fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     if let Some(motion) = &deck.conditioning_displacement {
         w.table("[conditioning]");
         w.line("conditioning", "displacement", vector(motion));
+    }
+}
+
+fn stages(w: &mut Writer<'_>, deck: &Deck) {
+    for stage in deck.stages.iter().filter(|_| deck.is_staged()) {
+        w.table("[[stage]]");
+        w.line("stage", "name", quote(&stage.name));
+        w.optional("stage", "steps", stage.steps.map(|steps| steps.to_string()));
+        w.optional("stage", "duration", stage.duration.map(number));
+        w.line("stage", "reset_displacement", stage.reset_displacement.to_string());
+    }
+}
+
+/// Where it is not that of a deck without stages.
+fn presence(w: &mut Writer<'_>, section: &str, presence: Presence, usual: Option<usize>) {
+    let stages = &w.deck.stages;
+    let name = |at: usize| quote(stages.get(at).map_or("later", |stage| &stage.name));
+    let from = match presence.from {
+        from if from == usual => None,
+        None => Some(quote("initial")),
+        // The only stage of a deck without any has no name.
+        Some(at) => w.deck.is_staged().then(|| name(at)),
+    };
+    let until = presence.until.map(name);
+    w.optional(section, "from", from);
+    w.optional(section, "until", until);
+}
+
+fn initial_stress(stress: &InitialStress) -> String {
+    match stress {
+        InitialStress::Components(all) => {
+            let names = ["xx", "yy", "zz", "xy", "yz", "xz"].into_iter().zip(all.iter());
+            let given = names.filter(|(_, value)| value.as_constant() != Some(0.0));
+            let mut pairs: Vec<_> = given.map(|(name, value)| (name, expression(value))).collect();
+            if pairs.is_empty() {
+                pairs.push(("xx", number(0.0)));
+            }
+            inline(&pairs)
+        }
+        InitialStress::K0(k0) => inline(&[
+            ("unit_weight", expression(&k0.unit_weight)),
+            ("surface", expression(&k0.surface)),
+            ("k0", expression(&k0.k0)),
+            ("surcharge", expression(&k0.surcharge)),
+            ("axis", quote(AXES[k0.axis])),
+        ]),
     }
 }
 
@@ -271,6 +327,8 @@ fn materials_and_bodies(w: &mut Writer<'_>, deck: &Deck) {
         }
         w.line("body", "velocity", expressions(&body.velocity));
         w.line("body", "overlap", quote(if body.may_overlap { "allow" } else { "refuse" }));
+        w.optional("body", "initial_stress", body.initial_stress.as_ref().map(initial_stress));
+        presence(w, "body", body.presence, None);
     }
 }
 
@@ -364,8 +422,18 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
                 [("centre", vector(&rotation.centre)), ("degrees", number(rotation.degrees))];
             w.line("boundary", "rotation", inline(&pairs));
         }
+        presence(w, "boundary", boundary.presence, Some(0));
     }
-    for load in &deck.loads {
+    if let Some(water) = deck.water() {
+        w.table("[water]");
+        w.line("water", "level", number(water.level));
+        w.line("water", "unit_weight", number(water.unit_weight));
+        w.line("water", "axis", quote(AXES[water.axis]));
+    }
+    for (load, &when) in deck.loads.iter().zip(&deck.load_presence) {
+        if matches!(load, Load::Water(_)) {
+            continue;
+        }
         w.table("[[load]]");
         match load {
             Load::Point { body, nearest, force } => {
@@ -399,7 +467,10 @@ fn conditions(w: &mut Writer<'_>, deck: &Deck) {
                 w.line("load", "pressure", inline(&pairs));
             }
             Load::Manufactured(field) => w.line("load", "manufactured", expressions(field)),
+            // Has a table of its own.
+            Load::Water(_) => {}
         }
+        presence(w, "load", when, Some(0));
     }
 }
 

@@ -36,6 +36,7 @@ words! {
         "explicit" => Explicit,
         "implicit-dynamic" => ImplicitDynamic,
         "conditioning" => Conditioning,
+        "strength-reduction" => StrengthReduction,
         "element-test" => ElementTest,
     }
     ElementPath {

@@ -113,7 +113,7 @@ impl<const D: usize> Load<D> for Manufactured {
             let scope = scope_of(points, p, at.load_factor, at.time);
             let made: [f64; D] = self.force(local(materials, points, p), &scope)?;
             for (f, b) in force.iter_mut().zip(made) {
-                *f += b * points.volume_initial[p];
+                *f += at.share * b * points.volume_initial[p];
             }
         }
         Ok(())

@@ -8,6 +8,7 @@
 //! | `pressure` | [`Pressure`] | `pressure.rs` | Given et al. 2024: virtual stress |
 //! | `pressure.surface` | [`SurfacePressure`] | `surface_pressure.rs` | formulations.md B.6 (b) |
 //! | `traction` | [`Traction`] | `traction.rs` | formulations.md B.6 (b) |
+//! | `[water]` | [`Water`](model::Water) | `water.rs` | formulations.md B.7 |
 //! | `manufactured` | [`Manufactured`] | `manufactured.rs` | Lagrangian §7.4 |
 //!
 //! A new load is one file that implements [`Load`] and one line of [`of_deck`].
@@ -19,6 +20,7 @@ mod point;
 pub mod pressure;
 mod surface_pressure;
 mod traction;
+mod water;
 
 pub use body_force::BodyForce;
 pub use gravity::Gravity;
@@ -28,9 +30,9 @@ pub use pressure::Pressure;
 pub use surface_pressure::SurfacePressure;
 pub use traction::Traction;
 
-use crate::deck::Scope;
 use crate::deck::expression::Expression;
 use crate::deck::model::{self, AnalysisType};
+use crate::deck::{Deck, Presence, Scope, When};
 use crate::error::{Error, Result};
 use crate::material::Material;
 use crate::points::Points;
@@ -39,18 +41,22 @@ use crate::surface::Surface;
 /// The moment at which loads are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moment {
-    /// s, 0 to 1 over the analysis.
+    /// s of the load: 0 to 1 over the stage it comes with, 1 later.
     pub load_factor: f64,
     /// t, s.
     pub time: f64,
     /// Factor of values that hold neither s nor t: s in quasi-static runs, 1 in dynamics.
     pub ramp: f64,
+    /// Share of the load that is left, of whatever form: 1, or what a stage has not yet released.
+    pub share: f64,
 }
 
 impl Moment {
-    pub fn new(kind: AnalysisType, load_factor: f64, time: f64) -> Self {
-        let ramp = if kind == AnalysisType::QuasiStatic { load_factor } else { 1.0 };
-        Moment { load_factor, time, ramp }
+    /// As a load that is there at certain times sees it.
+    pub fn new(kind: AnalysisType, presence: Presence, when: When) -> Self {
+        let load_factor = presence.factor(when);
+        let ramp = if kind.is_static() { load_factor } else { 1.0 };
+        Moment { load_factor, time: when.time, ramp, share: presence.share(when) }
     }
 
     /// Variables of an expression that holds no place.
@@ -58,9 +64,11 @@ impl Moment {
         Scope { load_factor: self.load_factor, time: self.time, ..Scope::default() }
     }
 
-    /// Factor of an expression's value: 1 where it says itself how it depends on s or t.
+    /// Factor of an expression's value: without the ramp where it says itself how it depends on s
+    /// or t.
     pub fn factor_of(&self, expression: &Expression) -> f64 {
-        if expression.depends_on_time() { 1.0 } else { self.ramp }
+        let ramp = if expression.depends_on_time() { 1.0 } else { self.ramp };
+        ramp * self.share
     }
 
     /// One ramped value per axis in `scope`.
@@ -143,9 +151,23 @@ pub fn of_deck<const D: usize>(
                 Box::new(Pressure::new(value, zone.as_ref(), cell)?)
             }
             model::Load::Manufactured(field) => Box::new(Manufactured::new(field)?),
+            model::Load::Water(water) => Box::new(*water),
         })
     });
     made.collect()
+}
+
+/// What bodies take of a load with this presence while they come and go, by their index: a body that
+/// comes takes what has acted before in proportion to s in quasi-static runs, one that goes takes the
+/// share 1 - s. `None`: all of it.
+pub fn shares_of_bodies(deck: &Deck, load: Presence, when: When) -> Option<Vec<f64>> {
+    let ramps = deck.analysis.kind.is_static() && !load.comes_in(when.stage);
+    let share = |body: &model::Body| {
+        let comes = ramps && body.presence.comes_in(when.stage);
+        body.presence.share(when) * if comes { when.factor } else { 1.0 }
+    };
+    let all: Vec<f64> = deck.bodies.iter().map(share).collect();
+    all.iter().any(|share| *share != 1.0).then_some(all)
 }
 
 /// Force on each point, N: what the points hold themselves (`points.point_force`), and the loads.
@@ -154,19 +176,36 @@ pub fn on_points<const D: usize>(
     points: &Points<D>,
     materials: &[Material],
     loads: &[Box<dyn Load<D>>],
-    at: Moment,
+    deck: &Deck,
+    when: When,
 ) -> Result<Vec<[f64; D]>> {
+    let kind = deck.analysis.kind;
+    let held = Moment::new(kind, Presence::default(), when);
     let mut forces: Vec<[f64; D]> =
-        points.point_force.iter().map(|force| force.map(|f| f * at.ramp)).collect();
-    for load in loads {
-        load.add_to_points(points, materials, at, &mut forces)?;
+        points.point_force.iter().map(|force| force.map(|f| f * held.ramp)).collect();
+    for (load, &presence) in loads.iter().zip(&deck.load_presence) {
+        let at = Moment::new(kind, presence, when);
+        if at.share == 0.0 {
+            continue;
+        }
+        let Some(shares) = shares_of_bodies(deck, presence, when) else {
+            load.add_to_points(points, materials, at, &mut forces)?;
+            continue;
+        };
+        let mut own = vec![[0.0; D]; points.len()];
+        load.add_to_points(points, materials, at, &mut own)?;
+        for ((force, own), &body) in forces.iter_mut().zip(own).zip(&points.body) {
+            for (sum, f) in force.iter_mut().zip(own) {
+                *sum += shares[body as usize] * f;
+            }
+        }
     }
     match forces.iter().position(|force| force.iter().any(|f| !f.is_finite())) {
         None => Ok(forces),
         Some(p) => Err(Error::Input(format!(
             "the load on point {} at {:?} is not finite ({:?} N at s = {}): check the expressions \
              of [[load]]",
-            points.id[p], points.position[p], forces[p], at.load_factor
+            points.id[p], points.position[p], forces[p], when.factor
         ))),
     }
 }

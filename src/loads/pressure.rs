@@ -76,12 +76,13 @@ impl Pressure {
         Ok(Pressure { value: value.clone(), smooth, zone: zone.cloned(), fade })
     }
 
-    /// Adds p at the place `x` of a point whose domain reaches `reach` to either side, m.
+    /// Adds p at the place `x` of a point whose domain reaches `reach` to either side, m; `body`: the
+    /// share that its body takes.
     pub fn add_at<const D: usize>(
         &self,
         x: &[f64; D],
         reach: &[f64; D],
-        at: Moment,
+        (at, body): (Moment, f64),
         sum: &mut PressureAt<D>,
     ) {
         let mut scope = Scope { load_factor: at.load_factor, time: at.time, ..Scope::default() };
@@ -95,7 +96,7 @@ impl Pressure {
                 jet = jet * fading(place, zone.min[axis], zone.max[axis], self.fade);
             }
         }
-        sum.add(&(jet * Jet::constant(at.factor_of(&self.value))));
+        sum.add(&(jet * Jet::constant(at.factor_of(&self.value) * body)));
     }
 }
 
@@ -138,11 +139,13 @@ impl<const D: usize> Load<D> for Pressure {
 mod tests {
     use super::*;
     use crate::deck::model::AnalysisType;
+    use crate::deck::{Presence, When};
 
     fn at(pressure: &Pressure, x: [f64; 2]) -> PressureAt<2> {
         let mut sum = PressureAt::default();
-        let moment = Moment::new(AnalysisType::QuasiStatic, 1.0, 0.0);
-        pressure.add_at(&x, &[0.1, 0.2], moment, &mut sum);
+        let when = When { factor: 1.0, ..When::default() };
+        let moment = Moment::new(AnalysisType::QuasiStatic, Presence::default(), when);
+        pressure.add_at(&x, &[0.1, 0.2], (moment, 1.0), &mut sum);
         sum
     }
 

@@ -1,10 +1,12 @@
 //! f = sqrt(J2) + eta p - xi c = 0 in Kirchhoff stress (p mean stress, tension positive), with the
 //! potential of the same form in eta_bar: closed-form return to the cone or to its apex
-//! p = xi c / eta (de Souza Neto, Peric, Owen 2008, section 8.3).
+//! p = xi c / eta (de Souza Neto, Peric, Owen 2008, section 8.3); with `softening` cohesion and angles
+//! fall with the plastic strain ([`super::softening`]).
 
-use super::mohr_coulomb::{COHESION, DILATION, FRICTION, STIFF, check_cone};
+use super::mohr_coulomb::{COHESION, DILATION, FRICTION, STIFF, check_cone, check_residual};
 use super::parameter::{POISSON, Parameter};
-use super::{Hencky, MOST_STATE, Misfit, Model, Response};
+use super::softening::{self, Falling};
+use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
 
 /// Share of the compared stresses; see the same constant of [`super::VonMises`].
 const YIELD_TOLERANCE: f64 = 1e-10;
@@ -25,6 +27,28 @@ pub struct DruckerPrager {
     /// xi c, Pa
     strength: f64,
     eta_bar: f64,
+    /// `None`: the strength stays.
+    softening: Option<Softening>,
+}
+
+/// How the strength falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Softening {
+    /// Where the fall ends.
+    strain: f64,
+    /// Angles in degrees, cohesion in Pa.
+    friction: Falling,
+    dilation: Falling,
+    cohesion: Falling,
+    fit: f64,
+}
+
+/// Rates, with κ, of the fields of [`DruckerPrager`] of these names.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rates {
+    eta: f64,
+    strength: f64,
+    eta_bar: f64,
 }
 
 /// eta (or eta_bar) and xi of an angle in degrees, by the place of the word in [`FIT`].
@@ -41,23 +65,62 @@ fn cone(degrees: f64, fit: f64) -> [f64; 2] {
     }
 }
 
-impl Model for DruckerPrager {
-    const NAME: &'static str = "drucker-prager";
-    const DOC: &'static str = "Hencky elasticity with a perfectly plastic Drucker-Prager cone and \
-        its apex, non-associated where dilation differs from friction.";
-    const PARAMETERS: &'static [Parameter] = &[STIFF, POISSON, FRICTION, DILATION, COHESION, FIT];
+/// d/d angle (degrees) of [`cone`].
+fn cone_rate(degrees: f64, fit: f64) -> [f64; 2] {
+    let angle = degrees.to_radians();
+    let (sine, cosine, tangent) = (angle.sin(), angle.cos(), angle.tan());
+    let rate = match fit as usize {
+        0 => {
+            let root = 9.0 + 12.0 * tangent * tangent;
+            let slope = (1.0 + tangent * tangent) / (root * root.sqrt());
+            [27.0 * slope, -36.0 * tangent * slope]
+        }
+        outer => {
+            // sin / (3 - s sin) and cos / (3 - s sin), s = 1 for the outer cone.
+            let s = if outer == 1 { 1.0 } else { -1.0 };
+            let below = (3.0 - s * sine).powi(2);
+            [3.0 * cosine, s - 3.0 * sine].map(|x| 6.0 / 3.0_f64.sqrt() * x / below)
+        }
+    };
+    rate.map(f64::to_radians)
+}
 
-    fn new(p: &[f64]) -> Self {
-        let ([eta, xi], [eta_bar, _]) = (cone(p[2], p[5]), cone(p[3], p[5]));
-        DruckerPrager { elasticity: Hencky::new(p[0], p[1]), eta, strength: xi * p[4], eta_bar }
+impl DruckerPrager {
+    /// The perfect surface of κ, and its rates.
+    fn softened(&self, softening: &Softening, kappa: f64) -> (DruckerPrager, Rates) {
+        let at = |falling: &Falling| falling.at(kappa, softening.strain);
+        let ([phi, phi_rate], [psi, psi_rate]) = (at(&softening.friction), at(&softening.dilation));
+        let [cohesion, cohesion_rate] = at(&softening.cohesion);
+        let ([eta, xi], [eta_bar, _]) = (cone(phi, softening.fit), cone(psi, softening.fit));
+        let [eta_slope, xi_slope] = cone_rate(phi, softening.fit);
+        let surface =
+            DruckerPrager { eta, strength: xi * cohesion, eta_bar, softening: None, ..*self };
+        let rates = Rates {
+            eta: eta_slope * phi_rate,
+            strength: xi_slope * phi_rate * cohesion + xi * cohesion_rate,
+            eta_bar: cone_rate(psi, softening.fit)[0] * psi_rate,
+        };
+        (surface, rates)
     }
 
-    fn check(p: &[f64]) -> Result<(), Misfit> {
-        check_cone(p[2], p[3], p[4])
-    }
-
+    /// [`Model::respond`] from κ on.
     #[inline(never)]
-    fn respond(&self, trial: [f64; 3], _: &[f64]) -> Response {
+    fn respond_softening(&self, softening: &Softening, trial: [f64; 3], kappa: f64) -> Response {
+        softening::respond(&self.elasticity, trial, (kappa, softening.strain), |kappa| {
+            let (surface, rates) = self.softened(softening, kappa);
+            surface.respond_with_rate(trial, Some(rates))
+        })
+    }
+
+    /// [`Model::respond`] of the perfectly plastic law.
+    #[inline(never)]
+    fn respond_perfectly(&self, trial: [f64; 3]) -> Response {
+        self.respond_with_rate(trial, None).0
+    }
+
+    /// The response, and the rate of its stress where the cone changes at `rates`.
+    #[inline(always)]
+    fn respond_with_rate(&self, trial: [f64; 3], rates: Option<Rates>) -> (Response, [f64; 3]) {
         let (bulk, mu) = (self.elasticity.bulk_modulus(), self.elasticity.mu);
         let volume = trial[0] + trial[1] + trial[2];
         let deviator = trial.map(|e| e - volume * (1.0 / 3.0));
@@ -67,12 +130,13 @@ impl Model for DruckerPrager {
         let excess = shear_stress + self.eta * pressure - self.strength;
         let scale = shear_stress + self.eta * pressure.abs() + self.strength;
         if excess <= YIELD_TOLERANCE * scale || excess.is_nan() {
-            return self.elasticity.respond_with(trial, [0.0; MOST_STATE]);
+            return (self.elasticity.respond_with(trial, [0.0; MOST_STATE]), [0.0; 3]);
         }
         let compliance = 1.0 / (mu + bulk * self.eta * self.eta_bar);
         let multiplier = compliance * excess;
         let on_cone = shear_stress - mu * multiplier >= 0.0;
         let mut tangent = [[0.0; 3]; 3];
+        let mut rate = [0.0; 3];
         let (stress, shear) = if on_cone {
             let share = mu * multiplier / shear_stress;
             let direction = deviator.map(|e| e / norm);
@@ -90,13 +154,25 @@ impl Model for DruckerPrager {
                 }
             }
             let kept = 2.0 * mu * (1.0 - share);
+            if let Some(to) = rates {
+                let sum = to.eta * self.eta_bar + self.eta * to.eta_bar;
+                let grown =
+                    compliance * (to.eta * pressure - to.strength - bulk * sum * multiplier);
+                let mean = -bulk * (to.eta_bar * multiplier + self.eta_bar * grown);
+                let less = 2.0 * mu * mu * grown / shear_stress;
+                rate = deviator.map(|e| mean - less * e);
+            }
             (deviator.map(|e| mean + kept * e), kept)
         } else {
+            if let Some(to) = rates {
+                let apex = self.strength / self.eta;
+                rate = [(to.strength - apex * to.eta) / self.eta; 3];
+            }
             ([self.strength / self.eta; 3], 0.0)
         };
         let elastic_strain = self.elasticity.strain(stress);
         let flow = [0, 1, 2].map(|a| trial[a] - elastic_strain[a]);
-        Response {
+        let response = Response {
             stress,
             elastic_strain,
             tangent,
@@ -104,6 +180,57 @@ impl Model for DruckerPrager {
             state: [0.0; MOST_STATE],
             plastic_increment: flow.iter().map(|e| e * e).sum::<f64>().sqrt(),
             dissipation: (0..3).map(|a| stress[a] * flow[a]).sum(),
+        };
+        (response, rate)
+    }
+}
+
+impl Model for DruckerPrager {
+    const NAME: &'static str = "drucker-prager";
+    const DOC: &'static str = "Hencky elasticity with a Drucker-Prager cone, perfect or softening, and \
+        its apex, non-associated where dilation differs from friction.";
+    const PARAMETERS: &'static [Parameter] = &[
+        STIFF,
+        POISSON,
+        FRICTION,
+        DILATION,
+        COHESION,
+        FIT,
+        softening::STRAIN,
+        softening::COHESION,
+        softening::FRICTION,
+        softening::DILATION,
+        softening::LENGTH,
+    ];
+    const STATE: &'static [StateVariable] = &[softening::KAPPA];
+
+    fn new(p: &[f64]) -> Self {
+        let ([eta, xi], [eta_bar, _]) = (cone(p[2], p[5]), cone(p[3], p[5]));
+        let softening = p[6].is_finite().then(|| Softening {
+            strain: p[6],
+            friction: Falling::new(p[2], p[8]),
+            dilation: Falling::new(p[3], p[9]),
+            cohesion: Falling::new(p[4], p[7]),
+            fit: p[5],
+        });
+        let elasticity = Hencky::new(p[0], p[1]);
+        DruckerPrager { elasticity, eta, strength: xi * p[4], eta_bar, softening }
+    }
+
+    fn state_words(&self) -> usize {
+        usize::from(self.softening.is_some())
+    }
+
+    fn check(p: &[f64]) -> Result<(), Misfit> {
+        check_cone(p[2], p[3], p[4])?;
+        check_residual(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]]).map(drop)
+    }
+
+    #[inline]
+    fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
+        match &self.softening {
+            None => self.respond_perfectly(trial),
+            Some(softening) => self.respond_softening(softening, trial, state[0]),
         }
     }
 
@@ -124,6 +251,6 @@ impl Model for DruckerPrager {
     }
 
     fn symmetric(&self) -> bool {
-        self.eta == self.eta_bar
+        self.eta == self.eta_bar && self.softening.is_none()
     }
 }

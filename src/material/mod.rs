@@ -19,6 +19,7 @@
 //! |---|---|
 //! | `model.rs` | [`Model`]: what each of them owes |
 //! | `local.rs` | [`LocalMaterial`]: the model with the parameters that hold at a point |
+//! | `softening.rs` | strength that falls with plastic strain |
 //! | `parameter.rs` | [`Parameter`]: what it reads from the deck |
 //! | `mod.rs` | the catalogue: a model is one file and one line here |
 //!
@@ -39,6 +40,9 @@ mod published;
 mod published_clay;
 #[cfg(test)]
 mod published_metals;
+mod softening;
+#[cfg(test)]
+mod softening_tests;
 pub mod tresca;
 pub mod von_mises;
 
@@ -155,6 +159,15 @@ pub struct Entry {
     pub check: fn(&[f64]) -> Result<(), Misfit>,
     /// The model of these parameters.
     pub make: fn(&[f64]) -> Material,
+}
+
+#[cfg(test)]
+impl Entry {
+    /// The first parameters as `given`, the others as where the deck leaves them out.
+    pub fn completed(&self, given: &[f64]) -> Vec<f64> {
+        let rest = self.parameters[given.len()..].iter().map(Parameter::value_if_absent);
+        given.iter().copied().chain(rest).collect()
+    }
 }
 
 impl PartialEq for Entry {

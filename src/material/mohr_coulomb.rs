@@ -6,9 +6,14 @@
 //! the elastic moduli D the return is tau = tau_trial - D G (N D G)^-1 (N tau_trial - k), and its
 //! tangent D - D G (N D G)^-1 N D. The order of the plane's result names the edge; an edge's result
 //! beyond the apex p = c cot phi names the apex. Three planes hold a stress fixed: no tangent.
+//!
+//! With `softening` cohesion and angles fall with the plastic strain: [`super::softening`]. At a fixed
+//! trial stress the return then changes with the planes, at the rate
+//! tau' = -D G' l - D G l', l' = (N D G)^-1 (N' tau - k' - N D G' l), l the multipliers.
 
 use super::parameter::{Absence, POISSON, POSITIVE, Parameter, Range, YOUNG, at_least};
-use super::{Hencky, MOST_STATE, Misfit, Model, Response};
+use super::softening::{self, Falling};
+use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
 
 /// A trial state counts as plastic when it lies outside a plane by more than this share of the
 /// stresses that the plane compares; see the same constant of [`super::VonMises`].
@@ -51,6 +56,28 @@ pub struct MohrCoulomb {
     apex: f64,
     /// Pa
     tension: f64,
+    /// `None`: the strength stays.
+    softening: Option<Softening>,
+}
+
+/// How the strength falls.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Softening {
+    /// Where the fall ends.
+    strain: f64,
+    /// Angles in rad, cohesion in Pa.
+    friction: Falling,
+    dilation: Falling,
+    cohesion: Falling,
+}
+
+/// Rates, with κ, of the fields of [`MohrCoulomb`] of these names.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rates {
+    sine: f64,
+    dilation: f64,
+    strength: f64,
+    apex: f64,
 }
 
 /// A plane N tau = k with its flow direction.
@@ -61,6 +88,17 @@ struct Plane {
     bound: f64,
 }
 
+/// What holds a returned stress.
+#[derive(Debug, Clone, Copy)]
+enum Active {
+    Nothing,
+    /// By major and minor axis, or the axis of a cut-off.
+    Planes([Option<(usize, usize)>; 2]),
+    Apex,
+    /// A corner of the cut-off, with this many of its planes.
+    Corner(usize),
+}
+
 /// A returned stress in the order of the sorted strains.
 struct Returned {
     stress: [f64; 3],
@@ -68,6 +106,7 @@ struct Returned {
     /// Smallest multiplier over the largest, and excess over the planes left out: how little the
     /// result is what the active planes were chosen for. Zero where all holds.
     misfit: f64,
+    active: Active,
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -92,6 +131,7 @@ impl MohrCoulomb {
             strength: 2.0 * cohesion * phi.cos(),
             apex,
             tension,
+            softening: None,
         }
     }
 
@@ -103,6 +143,14 @@ impl MohrCoulomb {
         flow[major] = 1.0 + self.dilation;
         flow[minor] = self.dilation - 1.0;
         Plane { normal, flow, bound: self.strength }
+    }
+
+    /// A shear plane by its two axes, a cut-off by its axis twice.
+    fn plane(&self, (major, minor): (usize, usize)) -> Plane {
+        match major == minor {
+            true => self.tension_plane(major),
+            false => self.shear_plane(major, minor),
+        }
     }
 
     fn tension_plane(&self, axis: usize) -> Plane {
@@ -129,7 +177,8 @@ impl MohrCoulomb {
     }
 
     /// The return to one or two planes.
-    fn onto<const K: usize>(&self, trial: [f64; 3], planes: [Plane; K]) -> Returned {
+    fn onto<const K: usize>(&self, trial: [f64; 3], axes: [(usize, usize); K]) -> Returned {
+        let planes = axes.map(|axes| self.plane(axes));
         let moduli = self.moduli();
         let times = |v: [f64; 3]| moduli.map(|row| dot(row, v));
         let flows = planes.map(|plane| times(plane.flow));
@@ -154,7 +203,8 @@ impl MohrCoulomb {
         let largest = multipliers.iter().fold(0.0, |most: f64, m| most.max(m.abs()));
         let least = multipliers.iter().fold(0.0, |least: f64, &m| least.min(m));
         let backward = if largest > 0.0 { -least / largest } else { 0.0 };
-        Returned { stress, tangent, misfit: backward }
+        let active = Active::Planes(std::array::from_fn(|k| axes.get(k).copied()));
+        Returned { stress, tangent, misfit: backward, active }
     }
 
     /// The stress of ordered trial stresses outside the surface.
@@ -164,16 +214,12 @@ impl MohrCoulomb {
             return sheared;
         }
         // Beyond the cut-off: of the sets of planes with it, the one that all conditions hold for.
-        let tension = [0, 1, 2].map(|axis| self.tension_plane(axis));
-        let shear = self.shear_plane(0, 2);
         let t = self.tension;
-        let below = ((1.0 + self.sine) * t - self.strength) / (1.0 - self.sine);
-        let fixed = |stress: [f64; 3]| Returned { stress, tangent: [[0.0; 3]; 3], misfit: 0.0 };
-        let mut edge = self.onto(trial, [tension[0], tension[1]]);
+        let below = self.below_cut_off();
+        let mut edge = self.onto(trial, [(0, 0), (1, 1)]);
         edge.stress[0] = t;
         edge.stress[1] = t;
-        let candidates =
-            [self.onto(trial, [tension[0]]), edge, self.onto(trial, [shear, tension[0]])];
+        let candidates = [self.onto(trial, [(0, 0)]), edge, self.onto(trial, [(0, 2), (0, 0)])];
         for candidate in candidates {
             if candidate.misfit + self.excess(candidate.stress) <= 1e-12 {
                 return candidate;
@@ -185,34 +231,145 @@ impl MohrCoulomb {
             let strain = self.elasticity.strain([0, 1, 2].map(|a| trial[a] - stress[a]));
             self.elasticity.energy(strain)
         };
-        let nearest = corners.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
-        fixed(nearest.unwrap_or([t; 3]))
+        let nearest =
+            (0..3).min_by(|&a, &b| distance(&corners[a]).total_cmp(&distance(&corners[b])));
+        let corner = nearest.unwrap_or(0);
+        let (stress, active) = (corners[corner], Active::Corner(3 - corner));
+        Returned { stress, tangent: [[0.0; 3]; 3], misfit: 0.0, active }
+    }
+
+    /// The smallest principal stress that the cut-off allows beside the largest, Pa.
+    fn below_cut_off(&self) -> f64 {
+        ((1.0 + self.sine) * self.tension - self.strength) / (1.0 - self.sine)
     }
 
     /// The return without cut-off.
     fn sheared(&self, trial: [f64; 3]) -> Returned {
         let main = self.shear_plane(0, 2);
         if dot(main.normal, trial) <= main.bound {
-            return Returned { stress: trial, tangent: self.moduli(), misfit: 0.0 };
+            let (stress, tangent) = (trial, self.moduli());
+            return Returned { stress, tangent, misfit: 0.0, active: Active::Nothing };
         }
-        let plane = self.onto(trial, [main]);
+        let plane = self.onto(trial, [(0, 2)]);
         let [a, b, c] = plane.stress;
         if a >= b && b >= c {
             return plane;
         }
         let mut edge = if a < b {
-            self.onto(trial, [main, self.shear_plane(1, 2)])
+            self.onto(trial, [(0, 2), (1, 2)])
         } else {
-            self.onto(trial, [main, self.shear_plane(0, 1)])
+            self.onto(trial, [(0, 2), (0, 1)])
         };
         // The two that merge are equal to the last bit.
         let pair = if a < b { [0, 1] } else { [1, 2] };
         let mean = 0.5 * (edge.stress[pair[0]] + edge.stress[pair[1]]);
         pair.iter().for_each(|&axis| edge.stress[axis] = mean);
         if edge.stress[0] > self.apex {
-            return Returned { stress: [self.apex; 3], tangent: [[0.0; 3]; 3], misfit: 0.0 };
+            let (stress, active) = ([self.apex; 3], Active::Apex);
+            return Returned { stress, tangent: [[0.0; 3]; 3], misfit: 0.0, active };
         }
         edge
+    }
+
+    /// The rate of a returned stress while planes change at these rates and the trial stress stays.
+    fn stress_rate(&self, trial: [f64; 3], returned: &Returned, rates: Rates) -> [f64; 3] {
+        match returned.active {
+            Active::Nothing => [0.0; 3],
+            Active::Apex => [rates.apex; 3],
+            Active::Corner(planes) => {
+                let below = (rates.sine * (self.tension + self.below_cut_off()) - rates.strength)
+                    / (1.0 - self.sine);
+                std::array::from_fn(|axis| if axis < planes { 0.0 } else { below })
+            }
+            Active::Planes([Some(one), None]) => self.rate_on(trial, [one], rates),
+            Active::Planes([Some(one), Some(other)]) => self.rate_on(trial, [one, other], rates),
+            Active::Planes([None, _]) => [0.0; 3],
+        }
+    }
+
+    fn rate_on<const K: usize>(
+        &self,
+        trial: [f64; 3],
+        axes: [(usize, usize); K],
+        rates: Rates,
+    ) -> [f64; 3] {
+        let moduli = self.moduli();
+        let times = |v: [f64; 3]| moduli.map(|row| dot(row, v));
+        let planes = axes.map(|axes| self.plane(axes));
+        let flows = planes.map(|plane| times(plane.flow));
+        let inverse = inverse(planes.map(|plane| flows.map(|flow| dot(plane.normal, flow))));
+        let solve = |sides: [f64; K]| -> [f64; K] {
+            std::array::from_fn(|i| (0..K).map(|j| inverse[i][j] * sides[j]).sum())
+        };
+        let multipliers = solve(planes.map(|plane| dot(plane.normal, trial) - plane.bound));
+        // sin enters both entries of a shear plane in the same way.
+        let along = |(major, minor): (usize, usize), rate: f64| {
+            let mut change = [0.0; 3];
+            if major != minor {
+                change[major] = rate;
+                change[minor] = rate;
+            }
+            change
+        };
+        let flow_rates = axes.map(|axes| times(along(axes, rates.dilation)));
+        let stress: [f64; 3] = std::array::from_fn(|a| {
+            trial[a] - (0..K).map(|i| multipliers[i] * flows[i][a]).sum::<f64>()
+        });
+        let sides: [f64; K] = std::array::from_fn(|i| {
+            let bound = if axes[i].0 == axes[i].1 { 0.0 } else { rates.strength };
+            let turned = (0..K).map(|j| multipliers[j] * dot(planes[i].normal, flow_rates[j]));
+            dot(along(axes[i], rates.sine), stress) - bound - turned.sum::<f64>()
+        });
+        let changes = solve(sides);
+        std::array::from_fn(|a| {
+            -(0..K)
+                .map(|i| multipliers[i] * flow_rates[i][a] + changes[i] * flows[i][a])
+                .sum::<f64>()
+        })
+    }
+
+    /// The perfect surface of κ, and its rates.
+    fn softened(&self, softening: &Softening, kappa: f64) -> (MohrCoulomb, Rates) {
+        let at = |falling: &Falling| falling.at(kappa, softening.strain);
+        let ([phi, phi_rate], [psi, psi_rate]) = (at(&softening.friction), at(&softening.dilation));
+        let [cohesion, cohesion_rate] = at(&softening.cohesion);
+        let surface = MohrCoulomb {
+            sine: phi.sin(),
+            dilation: psi.sin(),
+            strength: 2.0 * cohesion * phi.cos(),
+            apex: if phi > 0.0 { cohesion / phi.tan() } else { f64::INFINITY },
+            softening: None,
+            ..*self
+        };
+        let apex = match phi > 0.0 {
+            true => cohesion_rate / phi.tan() - cohesion * phi_rate / phi.sin().powi(2),
+            false => 0.0,
+        };
+        let strength = 2.0 * (cohesion_rate * phi.cos() - cohesion * phi.sin() * phi_rate);
+        let (sine, dilation) = (phi.cos() * phi_rate, psi.cos() * psi_rate);
+        (surface, Rates { sine, dilation, strength, apex })
+    }
+
+    /// The law with residual values (angles in degrees, cohesion in Pa; not a number where one
+    /// stays), reached at κ = `strain`.
+    pub fn softening(self, strain: f64, [friction, dilation, cohesion]: [[f64; 2]; 3]) -> Self {
+        let angle = |[peak, end]: [f64; 2]| Falling::new(peak.to_radians(), end.to_radians());
+        let softening = strain.is_finite().then(|| Softening {
+            strain,
+            friction: angle(friction),
+            dilation: angle(dilation),
+            cohesion: Falling::new(cohesion[0], cohesion[1]),
+        });
+        MohrCoulomb { softening, ..self }
+    }
+
+    /// [`Model::respond`] from κ on.
+    #[inline(never)]
+    fn respond_softening(&self, softening: &Softening, trial: [f64; 3], kappa: f64) -> Response {
+        softening::respond(&self.elasticity, trial, (kappa, softening.strain), |kappa| {
+            let (surface, rates) = self.softened(softening, kappa);
+            surface.respond_with_rate(trial, Some(rates))
+        })
     }
 
     fn is_elastic(&self, [a, _, c]: [f64; 3]) -> bool {
@@ -224,13 +381,19 @@ impl MohrCoulomb {
     /// [`Model::respond`] of the perfectly plastic law.
     #[inline(never)]
     fn respond_perfectly(&self, trial: [f64; 3]) -> Response {
+        self.respond_with_rate(trial, None).0
+    }
+
+    /// The response, and the rate of its stress where the planes change at `rates`.
+    #[inline(always)]
+    fn respond_with_rate(&self, trial: [f64; 3], rates: Option<Rates>) -> (Response, [f64; 3]) {
         let elastic = self.elasticity.stress(trial);
         // A stress that is not a number has no order; it goes through as the elastic one.
         let mut order = [0, 1, 2];
         order.sort_unstable_by(|&a, &b| trial[b].total_cmp(&trial[a]));
         let sorted = order.map(|axis| elastic[axis]);
         if elastic.iter().any(|s| !s.is_finite()) || self.is_elastic(sorted) {
-            return self.elasticity.respond_with(trial, [0.0; MOST_STATE]);
+            return (self.elasticity.respond_with(trial, [0.0; MOST_STATE]), [0.0; 3]);
         }
         let returned = self.returned(sorted);
         let (mut stress, mut tangent) = ([0.0; 3], [[0.0; 3]; 3]);
@@ -253,7 +416,14 @@ impl MohrCoulomb {
         });
         let elastic_strain = self.elasticity.strain(stress);
         let flow = [0, 1, 2].map(|a| trial[a] - elastic_strain[a]);
-        Response {
+        let mut rate = [0.0; 3];
+        if let Some(rates) = rates {
+            let sorted = self.stress_rate(sorted, &returned, rates);
+            for (axis, value) in order.into_iter().zip(sorted) {
+                rate[axis] = value;
+            }
+        }
+        let response = Response {
             stress,
             elastic_strain,
             tangent,
@@ -261,7 +431,8 @@ impl MohrCoulomb {
             state: [0.0; MOST_STATE],
             plastic_increment: dot(flow, flow).sqrt(),
             dissipation: dot(stress, flow),
-        }
+        };
+        (response, rate)
     }
 }
 
@@ -282,18 +453,38 @@ fn inverse<const K: usize>(matrix: [[f64; K]; K]) -> [[f64; K]; K] {
 
 impl Model for MohrCoulomb {
     const NAME: &'static str = "mohr-coulomb";
-    const DOC: &'static str = "Hencky elasticity with perfect Mohr-Coulomb plasticity, non-associated \
-        where dilation differs from friction, and an optional tension cut-off (associated).";
-    const PARAMETERS: &'static [Parameter] =
-        &[STIFF, POISSON, FRICTION, DILATION, COHESION, TENSION];
+    const DOC: &'static str = "Hencky elasticity with Mohr-Coulomb plasticity, perfect or softening, \
+        non-associated where dilation differs from friction, and an optional tension cut-off \
+        (associated).";
+    const PARAMETERS: &'static [Parameter] = &[
+        STIFF,
+        POISSON,
+        FRICTION,
+        DILATION,
+        COHESION,
+        TENSION,
+        softening::STRAIN,
+        softening::COHESION,
+        softening::FRICTION,
+        softening::DILATION,
+        softening::LENGTH,
+    ];
+    const STATE: &'static [StateVariable] = &[softening::KAPPA];
 
     fn new(p: &[f64]) -> Self {
-        Self::with(Hencky::new(p[0], p[1]), p[2], p[3], p[4], p[5])
+        let law = Self::with(Hencky::new(p[0], p[1]), p[2], p[3], p[4], p[5]);
+        law.softening(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])
+    }
+
+    fn state_words(&self) -> usize {
+        usize::from(self.softening.is_some())
     }
 
     fn check(p: &[f64]) -> Result<(), Misfit> {
         check_cone(p[2], p[3], p[4])?;
-        let apex = p[4] / p[2].to_radians().tan();
+        let [friction, _, cohesion] =
+            check_residual(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])?;
+        let apex = (p[4] / p[2].to_radians().tan()).min(cohesion / friction.to_radians().tan());
         if p[5].is_finite() && p[2] > 0.0 && p[5] > apex {
             let why = format!(
                 "{} Pa lies beyond the apex c cot phi = {apex} Pa, which bounds tension already: \
@@ -306,8 +497,11 @@ impl Model for MohrCoulomb {
     }
 
     #[inline]
-    fn respond(&self, trial: [f64; 3], _: &[f64]) -> Response {
-        self.respond_perfectly(trial)
+    fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
+        match &self.softening {
+            None => self.respond_perfectly(trial),
+            Some(softening) => self.respond_softening(softening, trial, state[0]),
+        }
     }
 
     fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
@@ -327,7 +521,7 @@ impl Model for MohrCoulomb {
     }
 
     fn symmetric(&self) -> bool {
-        self.sine == self.dilation
+        self.sine == self.dilation && self.softening.is_none()
     }
 }
 
@@ -346,4 +540,26 @@ pub(super) fn check_cone(friction: f64, dilation: f64, cohesion: f64) -> Result<
         return Err(Misfit { key: "dilation", why });
     }
     Ok(())
+}
+
+/// The residual angles (degrees) and cohesion (Pa) of peak and residual values, where the strength
+/// falls; the peak ones elsewhere.
+pub(super) fn check_residual(strain: f64, values: [[f64; 2]; 3]) -> Result<[f64; 3], Misfit> {
+    let keys = ["softening.friction", "softening.dilation", "softening.cohesion"];
+    let ends = values.map(|[peak, end]| if end.is_nan() { peak } else { end });
+    if strain.is_finite() {
+        for ((key, [peak, _]), end) in keys.into_iter().zip(values).zip(ends) {
+            if end > peak {
+                let why =
+                    format!("{end} is more than the peak value {peak}: expected at most that");
+                return Err(Misfit { key, why });
+            }
+        }
+        let [friction, dilation, cohesion] = ends;
+        check_cone(friction, dilation, cohesion).map_err(|misfit| {
+            let key = keys.into_iter().find(|key| key.ends_with(misfit.key)).unwrap_or(keys[2]);
+            Misfit { key, why: format!("of the residual values: {}", misfit.why) }
+        })?;
+    }
+    Ok(ends)
 }

@@ -1,8 +1,9 @@
-//! f = tau_1 - tau_3 - 2 c_u = 0 in Kirchhoff stress: Mohr-Coulomb without friction and dilation.
+//! f = tau_1 - tau_3 - 2 c_u = 0 in Kirchhoff stress: Mohr-Coulomb without friction and dilation,
+//! perfect or softening.
 
-use super::mohr_coulomb::STIFF;
+use super::mohr_coulomb::{STIFF, check_residual};
 use super::parameter::{POISSON, POSITIVE, Parameter};
-use super::{Hencky, Model, MohrCoulomb, Response};
+use super::{Hencky, Misfit, Model, MohrCoulomb, Response, StateVariable, softening};
 
 const SHEAR_STRENGTH: Parameter = Parameter::new(
     "shear_strength",
@@ -11,7 +12,7 @@ const SHEAR_STRENGTH: Parameter = Parameter::new(
     "c_u: undrained shear strength, half the largest difference of principal stresses.",
 );
 
-/// Perfect Tresca plasticity on Hencky elasticity.
+/// Tresca plasticity on Hencky elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tresca {
     pyramid: MohrCoulomb,
@@ -21,13 +22,31 @@ pub struct Tresca {
 
 impl Model for Tresca {
     const NAME: &'static str = "tresca";
-    const DOC: &'static str = "Hencky elasticity with perfect Tresca plasticity: undrained clay.";
-    const PARAMETERS: &'static [Parameter] = &[STIFF, POISSON, SHEAR_STRENGTH];
+    const DOC: &'static str =
+        "Hencky elasticity with Tresca plasticity, perfect or softening: undrained clay.";
+    const PARAMETERS: &'static [Parameter] = &[
+        STIFF,
+        POISSON,
+        SHEAR_STRENGTH,
+        softening::STRAIN,
+        softening::COHESION,
+        softening::LENGTH,
+    ];
+    const STATE: &'static [StateVariable] = &[softening::KAPPA];
 
     fn new(p: &[f64]) -> Self {
         let elasticity = Hencky::new(p[0], p[1]);
         let pyramid = MohrCoulomb::with(elasticity, 0.0, 0.0, p[2], f64::INFINITY);
+        let pyramid = pyramid.softening(p[3], [[0.0; 2], [0.0; 2], [p[2], p[4]]]);
         Tresca { pyramid, strength: p[2] }
+    }
+
+    fn check(p: &[f64]) -> Result<(), Misfit> {
+        check_residual(p[3], [[0.0; 2], [0.0; 2], [p[2], p[4]]]).map(drop)
+    }
+
+    fn state_words(&self) -> usize {
+        self.pyramid.state_words()
     }
 
     #[inline]
@@ -56,6 +75,6 @@ impl Model for Tresca {
     }
 
     fn symmetric(&self) -> bool {
-        true
+        self.pyramid.symmetric()
     }
 }

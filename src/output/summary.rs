@@ -46,9 +46,25 @@ pub struct Summary {
     /// Figures of merit of the deck's `[[verify]]`.
     pub verify: BTreeMap<String, f64>,
     pub bodies: BTreeMap<String, BodySummary>,
+    /// Of a strength reduction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub strength_factor: Option<f64>,
+    /// Of a deck that names stages, in their order.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stages: Vec<StageSummary>,
     pub versions: BTreeMap<String, String>,
     /// What the user should know of a run that went on, in the order of the first times.
     pub warnings: Vec<String>,
+}
+
+/// How far a stage has come.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+pub struct StageSummary {
+    pub name: String,
+    /// Nominal steps finished.
+    pub steps_completed: usize,
+    /// The stage is over.
+    pub completed: bool,
 }
 
 /// Over the run, and in the worst step.

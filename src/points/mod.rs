@@ -32,7 +32,7 @@ use gather::{Gather, Moves};
 use nalgebra::Matrix3;
 pub use named::Named;
 
-use crate::deck::model::{Basis, Method};
+use crate::deck::model::{Basis, Method, Water};
 use crate::grid::lattice::CORNER_SIGNS;
 use crate::tensor::Spectrum;
 use crate::tensor::spectral::ln_1p;
@@ -61,6 +61,10 @@ macro_rules! point_fields {
             pub slip: Named,
             /// `velocity_gradient` and `spread` are carried: an affine transfer.
             pub affine: bool,
+            /// `displacement_start` is carried: a stage resets the displacement.
+            pub counts_anew: bool,
+            /// What stands in the pores of all points.
+            pub water: Option<Water>,
         }
 
         impl<const D: usize> Points<D> {
@@ -220,6 +224,8 @@ point_fields! {
     velocity_gradient: [[f64; D]; D], D * D;
     /// Σ S (x_i - x_p)^2 along each axis when L was taken from the grid, m2; none without L
     spread: [f64; D], D;
+    /// Where the displacement counts from, m; none where it counts from the start
+    displacement_start: [f64; D], D;
     /// F at the end of the last finished step
     deformation_gradient: Matrix3<f64>, 9;
     /// b_e - 1, b_e the elastic left Cauchy-Green strain at the end of the last finished step: apart
@@ -265,7 +271,54 @@ impl<const D: usize> Points<D> {
     }
 
     fn carries(&self, field: &str) -> bool {
-        !(self.cornerless && field == "corners" || !self.affine && Self::of_affine(field))
+        !(self.cornerless && field == "corners"
+            || !self.affine && Self::of_affine(field)
+            || !self.counts_anew && field == "displacement_start")
+    }
+
+    /// Whether checkpoints hold a field only where points carry it.
+    pub fn is_optional(field: &str) -> bool {
+        Self::of_affine(field) || field == "displacement_start"
+    }
+
+    /// Whether a checkpoint holds a field of these points.
+    pub fn stores(&self, field: &str) -> bool {
+        !Self::is_optional(field) || self.carries(field)
+    }
+
+    /// u = x - X, or since the last stage that reset it, m.
+    pub fn displacement(&self, p: usize) -> [f64; D] {
+        let start = self.displacement_start.get(p).unwrap_or(&self.position_initial[p]);
+        std::array::from_fn(|a| self.position[p][a] - start[a])
+    }
+
+    /// Pore pressure, Pa, compression positive.
+    pub fn pore_pressure(&self, p: usize) -> f64 {
+        self.water.map_or(0.0, |water| water.pressure(&self.position[p]))
+    }
+
+    /// Appends points of another container with the same fields.
+    pub fn append(&mut self, other: &Points<D>) {
+        let mut record = Vec::with_capacity(other.record_words());
+        for p in 0..other.len() {
+            record.clear();
+            other.pack(p, &mut record);
+            self.unpack(&record);
+        }
+    }
+
+    /// A container without points that carries the same fields.
+    pub fn empty_like(&self) -> Self {
+        Points {
+            cornerless: self.cornerless,
+            affine: self.affine,
+            counts_anew: self.counts_anew,
+            water: self.water,
+            state: self.state.empty_like(),
+            parameters: self.parameters.empty_like(),
+            slip: self.slip.empty_like(),
+            ..Points::default()
+        }
     }
 
     /// Whether only an affine transfer has this field.
@@ -328,6 +381,9 @@ impl<const D: usize> Points<D> {
         if self.affine {
             self.velocity_gradient.push([[0.0; D]; D]);
             self.spread.push([0.0; D]);
+        }
+        if self.counts_anew {
+            self.displacement_start.push(position);
         }
         self.deformation_gradient.push(Matrix3::identity());
         self.elastic_excess.push(Matrix3::zeros());

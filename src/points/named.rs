@@ -17,6 +17,11 @@ pub struct Named {
 }
 
 impl Named {
+    /// The same words, of no points.
+    pub fn empty_like(&self) -> Self {
+        Named { names: self.names.clone(), stride: self.stride, values: Vec::new() }
+    }
+
     /// Without points; `names` of each body's words.
     pub fn new(names: Vec<Vec<String>>) -> Self {
         let stride = names.iter().map(Vec::len).max().unwrap_or(0);

@@ -4,7 +4,7 @@
 //! a cell, do not overlap.
 
 use crate::deck::model::{Body, BodySource, Deck};
-use crate::deck::{Shape, Side};
+use crate::deck::{Presence, Shape, Side};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 
@@ -55,7 +55,15 @@ pub fn check<const D: usize>(deck: &Deck, grid: &Grid<D>, points: &Points<D>) ->
 }
 
 fn allowed(one: &Body, other: &Body) -> bool {
-    one.may_overlap || other.may_overlap
+    one.may_overlap || other.may_overlap || !meet(one.presence, other.presence)
+}
+
+/// Whether there is a stage that holds both.
+fn meet(one: Presence, other: Presence) -> bool {
+    let before = |a: Presence, b: Presence| {
+        a.until.is_some_and(|until| b.from.is_some_and(|from| until < from))
+    };
+    !before(one, other) && !before(other, one)
 }
 
 fn overlap(deck: &Deck, first: usize, second: usize, how: String) -> Error {

@@ -20,6 +20,8 @@ pub fn seed<const D: usize>(
     share: Share,
 ) -> Result<(Points<D>, Vec<u64>)> {
     let mut points = Points::of_method(&deck.method);
+    points.water = deck.water();
+    points.counts_anew = deck.stages.iter().any(|stage| stage.reset_displacement);
     let (mut first_id, mut first_ids) = (0u64, Vec::with_capacity(deck.bodies.len()));
     for (index, body) in deck.bodies.iter().enumerate() {
         let made = points.len();

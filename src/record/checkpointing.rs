@@ -7,8 +7,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::deck::model::{Checkpoint as Plan, Grid as GridSource, MeshSource};
-use crate::deck::physics::physics;
+use crate::deck::model::{AnalysisType, Checkpoint as Plan, Grid as GridSource, MeshSource};
+use crate::deck::physics::Physics;
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
 use crate::input_file;
@@ -48,13 +48,13 @@ pub struct Checkpointer {
 
 impl Checkpointer {
     /// `physics` as [`physics_of`] gives it.
-    pub fn new(deck: &Deck, physics: String, directory: &ResultsDirectory) -> Self {
+    pub fn new(deck: &Deck, physics: &Physics, directory: &ResultsDirectory) -> Self {
         // Without a word in the deck only signals write.
         let plan = deck.output.checkpoint.unwrap_or(Plan { every: None, minutes: None, keep: 2 });
         Checkpointer {
             plan,
             directory: directory.path().to_path_buf(),
-            physics,
+            physics: physics.whole().to_string(),
             resolved: deck::resolved(deck),
             last: Instant::now(),
         }
@@ -118,8 +118,8 @@ impl Checkpointer {
 
 /// What identifies the problem in a checkpoint: the deck's physics and, for a mesh from a file,
 /// a checksum of that file. Collective.
-pub fn physics_of(world: &World, deck: &Deck) -> Result<String> {
-    let mut text = physics(deck);
+pub fn physics_of(world: &World, deck: &Deck) -> Result<Physics> {
+    let mut physics = Physics::of(deck);
     if let GridSource::Mesh(mesh) = &deck.grid
         && let MeshSource::File(path) = &mesh.source
     {
@@ -134,9 +134,9 @@ pub fn physics_of(world: &World, deck: &Deck) -> Result<String> {
         let mut bytes = sum.to_le_bytes().to_vec();
         world.broadcast_bytes(0, &mut bytes);
         let hex: Vec<String> = bytes.iter().rev().map(|byte| format!("{byte:02x}")).collect();
-        text.push_str(&format!("\nchecksum of the mesh file = {}", hex.concat()));
+        physics.push_line(&format!("checksum of the mesh file = {}", hex.concat()));
     }
-    Ok(text)
+    Ok(physics)
 }
 
 /// Finds and reads the checkpoint that `--restart` names. `last`: the newest good one in the
@@ -144,7 +144,7 @@ pub fn physics_of(world: &World, deck: &Deck) -> Result<String> {
 /// passed over with a word about it. Nothing is written. Collective. Errors: exit code 3.
 pub fn find<const D: usize>(
     world: &World,
-    physics: &str,
+    physics: &Physics,
     choice: &Restart,
     out: &Path,
     log: &mut Log,
@@ -197,6 +197,8 @@ pub fn find<const D: usize>(
 pub fn require_room<const D: usize>(deck: &Deck, found: &Restored<D>) -> Result<()> {
     let analysis = &deck.analysis;
     let behind = match (analysis.steps, analysis.duration) {
+        // The trials of a strength reduction follow its steps.
+        (Some(_), _) if analysis.kind == AnalysisType::StrengthReduction => None,
         (Some(steps), _) => (found.step > steps).then(|| format!("analysis.steps = {steps}")),
         (None, Some(duration)) => {
             let time = found.state.number("time_steps.time").unwrap_or(0.0);

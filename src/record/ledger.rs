@@ -34,6 +34,8 @@ pub struct Entry {
     pub work: f64,
     /// v M v of the nodes that boundaries move.
     pub driven: f64,
+    /// What damping took in the step.
+    pub damped: f64,
     /// GIMP domains that had grown far beyond what their points are stretched by.
     pub overgrown: f64,
     pub momentum: [f64; 3],
@@ -49,6 +51,7 @@ pub struct StepSums {
     pub ghost: f64,
     pub work: f64,
     pub driven: f64,
+    pub damped: f64,
     /// GIMP domains put back to what their points are stretched by.
     pub overgrown: usize,
 }
@@ -83,7 +86,7 @@ impl Entry {
                 }
             }
         }
-        let StepSums { energies, ghost, work, driven, overgrown } = sums;
+        let StepSums { energies, ghost, work, driven, overgrown, damped } = sums;
         let all = world.sum_slice(&[
             kinetic,
             energies.strain,
@@ -98,6 +101,7 @@ impl Entry {
             angular[1],
             angular[2],
             overgrown as f64,
+            damped,
         ]);
         Entry {
             kinetic: all[0],
@@ -106,6 +110,7 @@ impl Entry {
             ghost: all[3],
             work: all[4],
             driven: all[5],
+            damped: all[13],
             overgrown: all[12],
             momentum: [all[6], all[7], all[8]],
             angular_momentum: [all[9], all[10], all[11]],
@@ -125,6 +130,8 @@ pub struct Ledger {
     /// Sum of the work, and of its magnitude.
     work: f64,
     gross_work: f64,
+    /// What damping has taken.
+    damped: f64,
     /// What is not judged: NOISE, or the largest LEAD so far.
     noise: f64,
 }
@@ -132,7 +139,18 @@ pub struct Ledger {
 impl Ledger {
     /// `start`: the state before the first step; `wave_energy`: Σ m c^2, J.
     pub fn new(start: &Entry, wave_energy: f64) -> Self {
-        Ledger { start: start.total(), work: 0.0, gross_work: 0.0, noise: NOISE * wave_energy }
+        Ledger {
+            start: start.total(),
+            work: 0.0,
+            gross_work: 0.0,
+            damped: 0.0,
+            noise: NOISE * wave_energy,
+        }
+    }
+
+    /// Bodies have come and gone with this much energy, J.
+    pub fn take_in(&mut self, energy: f64) {
+        self.start += energy;
     }
 
     /// Writes the sums into a checkpoint.
@@ -148,22 +166,25 @@ impl Ledger {
         self.work = state.number("ledger.work")?;
         self.gross_work = state.number("ledger.gross_work")?;
         self.noise = state.number("ledger.noise")?;
+        // Not known to the first checkpoints of this format.
+        self.damped = state.number("ledger.damped").unwrap_or(0.0);
         Ok(())
     }
 
-    fn fields(&self) -> [(&'static str, f64); 4] {
+    fn fields(&self) -> [(&'static str, f64); 5] {
         [
             ("ledger.start", self.start),
             ("ledger.work", self.work),
             ("ledger.gross_work", self.gross_work),
             ("ledger.noise", self.noise),
+            ("ledger.damped", self.damped),
         ]
     }
 
     /// Energy that came from nowhere up to a booked state, as a share of what was there or brought
     /// in, where that share is worth a warning.
     pub fn gain(&self, entry: &Entry) -> Option<f64> {
-        let gained = entry.total() - self.start - self.work;
+        let gained = entry.total() + self.damped - self.start - self.work;
         let brought = self.start + self.gross_work;
         let noise = self.noise.max(LEAD * entry.driven);
         (gained > WORTH_A_WARNING * brought + noise).then(|| gained / brought)
@@ -178,14 +199,17 @@ impl Ledger {
         row.energy_plastic = entry.plastic;
         row.energy_ghost = entry.ghost;
         row.work_external = work;
+        let damped = self.damped + entry.damped;
+        row.dissipation_damping = damped;
         row.momentum = entry.momentum;
         row.angular_momentum = entry.angular_momentum;
 
-        let gained = entry.total() - self.start - work;
+        let gained = entry.total() + damped - self.start - work;
         let brought = self.start + gross_work;
         let noise = self.noise.max(LEAD * entry.driven);
         if gained.is_finite() && gained <= GROWTH * brought + noise {
             (self.work, self.gross_work, self.noise) = (work, gross_work, noise);
+            self.damped = damped;
             return Ok(());
         }
         Err(format!(

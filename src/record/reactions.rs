@@ -1,6 +1,7 @@
 //! What the boundaries bear: force, sum of nodal magnitudes (Rotation Figure 7) and torque, per
 //! named boundary.
 
+use crate::deck::When;
 use crate::deck::model::Boundary;
 use crate::grid::Grid;
 use crate::output::tables::history::Reaction;
@@ -73,16 +74,16 @@ pub fn supports_at_start<const D: usize>(
         true => Vec::new(),
         false => vec![0.0; mesh.numbering.len() * D],
     };
-    supports(model, mesh, points, (span.factor_start, span.time_start), &still)
+    supports(model, mesh, points, span.start(), &still)
 }
 
 /// What they bear after the nodal increments `displacement` (local nodes, m) of a step whose points
-/// have not been updated; `at`: load factor and time, s.
+/// have not been updated; at the moment `when`.
 pub fn supports<const D: usize>(
     model: &Model<D>,
     mesh: &Discretisation<D>,
     points: &Points<D>,
-    at: (f64, f64),
+    when: When,
     displacement: &[f64],
 ) -> Vec<Borne> {
     if model.supports.is_empty() {
@@ -90,7 +91,7 @@ pub fn supports<const D: usize>(
     }
     let step = mesh.step_points(points, &model.materials);
     let count = model.deck.boundaries.len();
-    let term = SurfaceTerm::new(model, step, &mesh.carriers, at.0, at.1);
+    let term = SurfaceTerm::new(model, step, &mesh.carriers, when);
     term.map_or(Vec::new(), |term| term.borne(step, displacement, count))
 }
 

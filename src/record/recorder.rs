@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use super::contact::surfaces;
 use crate::contact::pose::Pose;
-use crate::deck::Deck;
 use crate::deck::model::{AnalysisType, Every, Symmetry};
+use crate::deck::{Deck, Presence, Stage};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::directory::ResultsDirectory;
@@ -17,8 +17,8 @@ use crate::output::series::grid_file::{GridFrame, GridSeries};
 use crate::output::series::point_field::PointField;
 use crate::output::series::points_file::PointsSeries;
 use crate::output::series::rigid_file::RigidSeries;
-use crate::output::summary::Summary;
 use crate::output::summary::{Communication, Count, Status};
+use crate::output::summary::{StageSummary, Summary};
 use crate::output::tables::csv_table::Mark;
 use crate::output::tables::history::History;
 use crate::output::tables::history::{HistoryRow, Layout};
@@ -59,9 +59,16 @@ pub struct Recorder {
     pub newton: Count,
     pub linear: Count,
     pub steps_completed: usize,
-    /// Names of the deck's boundaries and the volume that each held in the first row of this
-    /// process, m3.
-    holds: Vec<(String, Option<f64>)>,
+    /// What a strength reduction has found.
+    pub strength_factor: Option<f64>,
+    /// Names of the deck's boundaries, when they are there, and the volume that each held in its
+    /// first row of this process, m3.
+    holds: Vec<(String, Presence, Option<f64>)>,
+    /// Nominal steps finished in each stage.
+    stages: Vec<usize>,
+    staged: bool,
+    /// The present one, from zero.
+    stage: usize,
     /// The last step with a row in the history.
     recorded: usize,
     /// Those of them before a restart.
@@ -183,6 +190,9 @@ impl Recorder {
             },
             contacts: deck.contacts.iter().map(|contact| contact.name.clone()).collect(),
             conditioning: deck.analysis.kind == AnalysisType::Conditioning,
+            staged: deck.is_staged(),
+            damped: deck.analysis.damping.is_some(),
+            reduced: deck.analysis.kind == AnalysisType::StrengthReduction,
         };
         let fields = PointField::parse_list(&deck.output.fields)?;
         let (basis, dimension) = (deck.method.basis, deck.dimension);
@@ -252,11 +262,19 @@ impl Recorder {
             rows_every: deck.output.history,
             last_row: 0.0,
             since_row: SinceRow::default(),
-            steps: deck.analysis.steps,
+            // Nobody knows how many trials a strength reduction takes.
+            steps: deck
+                .analysis
+                .steps
+                .filter(|_| deck.analysis.kind != AnalysisType::StrengthReduction),
+            strength_factor: None,
             newton: Count::default(),
             linear: Count::default(),
             steps_completed: 0,
-            holds: deck.boundaries.iter().map(|b| (b.name.clone(), None)).collect(),
+            holds: deck.boundaries.iter().map(|b| (b.name.clone(), b.presence, None)).collect(),
+            stages: vec![0; deck.stages.len()],
+            staged: deck.is_staged(),
+            stage: 0,
             recorded: 0,
             earlier_steps: 0,
             reached: (0.0, 0.0),
@@ -393,6 +411,9 @@ impl Recorder {
         if let Some(probes) = &self.probes {
             probes.save(state);
         }
+        for (index, steps) in self.stages.iter().enumerate().filter(|_| self.staged) {
+            state.set_count(&format!("recorder.stage_{index}"), *steps as u64);
+        }
         state.set("recorder.last_frame", self.last_frame);
         state.set("recorder.last_row", self.last_row);
         state.set("recorder.moved_since_row", self.since_row.moved);
@@ -410,6 +431,11 @@ impl Recorder {
         self.linear =
             Count { total: count("recorder.linear_total")?, max: count("recorder.linear_max")? };
         self.populated_cells = count("recorder.populated_cells")?;
+        for (index, steps) in self.stages.iter_mut().enumerate() {
+            // Stages may have been added.
+            *steps = count(&format!("recorder.stage_{index}")).unwrap_or(0);
+        }
+        self.stage = self.stages.iter().rposition(|&steps| steps > 0).unwrap_or(0);
         self.last_frame = state.number("recorder.last_frame")?;
         // Not known to the first checkpoints of this format, whose steps all have rows.
         self.last_row = state.number("recorder.last_row").unwrap_or(0.0);
@@ -459,6 +485,11 @@ impl Recorder {
         self.watch_boundaries(row);
         self.recorded = row.step;
         self.reached = (row.load_factor, row.time);
+        if moment != Moment::PartOfStep
+            && let Some(steps) = self.stages.get_mut(row.stage)
+        {
+            *steps += 1;
+        }
         self.populated_cells = row.populated_cells;
         self.imbalance = row.imbalance;
         let newton = with_newton.then_some(NewtonReport {
@@ -470,7 +501,10 @@ impl Recorder {
         let report = StepReport {
             step: row.step,
             steps: self.steps,
-            share: row.load_factor,
+            share: match self.steps.filter(|_| self.staged) {
+                Some(steps) => row.step as f64 / steps as f64,
+                None => row.load_factor,
+            },
             time: (row.time > 0.0).then_some(row.time),
             newton,
             elapsed: row.wall_seconds,
@@ -483,7 +517,10 @@ impl Recorder {
     /// Warns of boundaries that the bodies have left since the first row. One that held nothing then
     /// waits for a body, which may come and go.
     fn watch_boundaries(&mut self, row: &HistoryRow) {
-        for ((name, first), reaction) in self.holds.iter_mut().zip(&row.reactions) {
+        for ((name, presence, first), reaction) in self.holds.iter_mut().zip(&row.reactions) {
+            if !presence.holds_in(row.stage) {
+                continue;
+            }
             let (first, held) = (*first.get_or_insert(reaction.held), reaction.held);
             if 4.0 * held >= first {
                 continue;
@@ -499,7 +536,7 @@ impl Recorder {
     }
 
     fn wants_row(&mut self, row: &HistoryRow, moment: Moment) -> bool {
-        let time = if row.time > 0.0 { row.time } else { row.load_factor };
+        let time = if row.time > 0.0 { row.time } else { row.stage as f64 + row.load_factor };
         let wanted = match self.rows_every {
             Every::Steps(1) => true,
             Every::Steps(every) => moment == Moment::Step && row.step.is_multiple_of(every.max(1)),
@@ -618,6 +655,28 @@ impl Recorder {
         }
     }
 
+    /// How far each stage of a deck that names them has come.
+    fn stages_of(&self, deck: &Deck, all: bool) -> Vec<StageSummary> {
+        let of_stage = |(index, (stage, &done)): (usize, (&Stage, &usize))| StageSummary {
+            name: stage.name.clone(),
+            steps_completed: done,
+            completed: all || index < self.stage || stage.steps == Some(done),
+        };
+        let stages = deck.stages.iter().zip(&self.stages).enumerate();
+        stages.map(of_stage).filter(|_| self.staged).collect()
+    }
+
+    /// A stage begins, from zero: what is recorded from now on is its.
+    pub fn enter_stage(&mut self, stage: usize) {
+        self.stage = stage;
+        self.points.stage = self.staged.then_some(stage as u64 + 1);
+    }
+
+    /// The present stage, from zero.
+    pub fn stage(&self) -> usize {
+        self.stage
+    }
+
     /// Steps that this process has completed, without those before a restart.
     pub fn steps_here(&self) -> usize {
         self.steps_completed - self.earlier_steps
@@ -653,6 +712,8 @@ impl Recorder {
             communication,
             verify,
             bodies: deck.bodies.iter().map(|body| body.name.clone()).zip(bodies).collect(),
+            strength_factor: self.strength_factor,
+            stages: self.stages_of(deck, ending.status == Status::Completed),
             versions: self.versions.clone(),
             warnings: self.log.warnings(),
         };

@@ -36,7 +36,8 @@ impl Figures {
 pub fn of_run<const D: usize>(run: &mut Run<D>) -> Result<BTreeMap<String, f64>> {
     let Run { world, model, points, recorder, .. } = run;
     let (factor, time) = recorder.reached;
-    let time = if model.deck.analysis.kind.has_time() { time } else { factor };
+    let before = recorder.stage() as f64;
+    let time = if model.deck.analysis.kind.has_time() { time } else { before + factor };
     let mut figures = figures(world, &model.deck.verify, points, factor, time)?;
     if let Some(field) = &model.manufactured {
         let materials = &model.materials;

@@ -32,7 +32,7 @@ pub fn warning<const D: usize>(
 ) -> Option<String> {
     let deck = &model.deck;
     let implicit =
-        matches!(deck.analysis.kind, AnalysisType::QuasiStatic | AnalysisType::ImplicitDynamic);
+        deck.analysis.kind.is_static() || deck.analysis.kind == AnalysisType::ImplicitDynamic;
     if !implicit || deck.method.locking != Locking::None {
         return None;
     }

@@ -8,21 +8,36 @@ use crate::material::{Material, local};
 use crate::parallel::World;
 use crate::points::{Named, Points};
 
+use super::initial_stress;
+
 /// One material per body. Where parameters vary, those of the points take their place.
 pub fn of_bodies(deck: &Deck) -> Vec<Material> {
     let somewhere = Scope::default();
     deck.bodies.iter().map(|body| deck.materials[body.material].at(&somewhere)).collect()
 }
 
-/// Gives the points their own parameters and the state of an unstrained point. Error, the same on
-/// all ranks: parameters that are no good at a point, by key and place. Collective.
+/// Whether [`equip`] gives the points the stress of the deck.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stresses {
+    Initial,
+    /// They have brought theirs.
+    Kept,
+}
+
+/// Gives the points their own parameters, the initial stress of the deck if they have none yet, and
+/// the state of a point under its stress. Error, the same on
+/// all ranks: parameters or stresses that are no good at a point, by key and place. Collective.
 pub fn equip<const D: usize>(
     world: &World,
     deck: &Deck,
     materials: &[Material],
     points: &mut Points<D>,
+    stresses: Stresses,
 ) -> Result<()> {
     set_parameters(world, deck, points)?;
+    if stresses == Stresses::Initial {
+        initial_stress::set(world, deck, materials, points)?;
+    }
     points.state = Named::zeros(state_names(deck, materials), points.len());
     let mut fault: Option<(u64, String)> = None;
     for p in 0..points.len() {
@@ -42,7 +57,11 @@ pub fn equip<const D: usize>(
         }
         points.state.set(p, &state);
     }
-    world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))
+    world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))?;
+    match stresses {
+        Stresses::Initial => initial_stress::require_elastic(world, deck, materials, points),
+        Stresses::Kept => Ok(()),
+    }
 }
 
 /// Gives the points their own parameters and keeps the state that a checkpoint held, in the order
@@ -55,7 +74,7 @@ pub fn equip_restored<const D: usize>(
     points: &mut Points<D>,
 ) -> Result<()> {
     let stored = std::mem::take(&mut points.state);
-    equip(world, deck, materials, points)?;
+    equip(world, deck, materials, points, Stresses::Kept)?;
     let mut missing = None;
     for p in 0..points.len() {
         let body = points.body[p];

@@ -8,12 +8,14 @@
 //! | deck to points on their ranks | `setup.rs` |
 //! | parameters and state of the points' materials | `materials.rs` |
 //! | surfaces and the points that carry them | `surfaces.rs` |
+//! | stress before the first step | `initial_stress.rs` |
 //! | what is checked before anything is written | `start_checks/` |
 //! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs`, `locking.rs` |
 //! | the process that MPI starts | `process.rs` |
 
 mod aside;
 mod element_run;
+mod initial_stress;
 mod locking;
 mod materials;
 pub mod plan;

@@ -70,8 +70,8 @@ pub(crate) fn memory<const D: usize>(basis: Basis, points: f64, nodes: f64) -> f
         _ => (30, 90),
     };
     let corners = if matches!(basis, Basis::Mpm | Basis::Gimp) { 8 * D } else { 0 };
-    // An affine transfer's share is left out: few runs have one.
-    let affine = D * D + D;
+    // What affine transfers and stages carry is left out: few runs have it.
+    let affine = D * D + D + D;
     let per_point = 8 * (Points::<D>::base_words() - corners - affine) + nodes_each * (16 + 8 * D);
     let per_node = row * (8 * D * D * 3 + 8);
     points * per_point as f64 + nodes * per_node as f64
@@ -102,8 +102,10 @@ fn filling<const D: usize>(
     points: &Points<D>,
 ) -> Vec<(String, String)> {
     let mut seeded = vec![0.0; model.deck.bodies.len()];
-    for (volume, &body) in points.volume_initial.iter().zip(&points.body) {
-        seeded[body as usize] += volume;
+    for points in [points, &model.waiting] {
+        for (volume, &body) in points.volume_initial.iter().zip(&points.body) {
+            seeded[body as usize] += volume;
+        }
     }
     let rings = model.deck.analysis.symmetry == Symmetry::Axisymmetric;
     let unit = if D == 2 && !rings { "m2" } else { "m3" };

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use crate::analysis::time_steps::{TimeSteps, stability_limit};
 use crate::deck::model::{AnalysisType, Every, Load, Material};
-use crate::deck::rough;
+use crate::deck::{Presence, When, rough};
 use crate::loads::Moment;
 use crate::parallel::World;
 use crate::points::Points;
@@ -36,7 +36,8 @@ pub fn weight_ratios<const D: usize>(
     points: &Points<D>,
 ) -> Vec<Row> {
     // As it is at the end of a quasi-static run, and at the start of a dynamic one.
-    let at = Moment::new(model.deck.analysis.kind, 1.0, 0.0);
+    let when = When { factor: 1.0, ..When::default() };
+    let at = Moment::new(model.deck.analysis.kind, Presence::default(), when);
     let mut gravity = [0.0; D];
     for load in &model.deck.loads {
         if let Load::Gravity(g) = load {
@@ -52,7 +53,8 @@ pub fn weight_ratios<const D: usize>(
     for (index, body) in model.deck.bodies.iter().enumerate() {
         let weight = body.density * size * heights[index];
         let young = model.stiffness[index];
-        if weight == 0.0 || young == 0.0 {
+        // A body that is not there yet has no height.
+        if weight == 0.0 || young == 0.0 || !weight.is_finite() {
             continue;
         }
         let of_young = weight / young;
@@ -152,7 +154,7 @@ pub fn steps<const D: usize>(
             .map(|duration| format!("{} s, {steps} steps", rough(duration / steps as f64)));
         return (text, steps as f64);
     }
-    let times = TimeSteps::new(analysis);
+    let times = TimeSteps::new(&model.deck);
     let limit = stability_limit(world, model, points).0;
     let Some(StepSpan { time_start, time_end, .. }) = times.next(limit) else {
         return (None, 0.0);

@@ -30,6 +30,7 @@ use super::start_checks::support;
 use super::{aside, element_run, plan, process, setup};
 use crate::analysis::explicit::Explicit;
 use crate::analysis::implicit::{self, Implicit};
+use crate::analysis::strength_reduction::StrengthReduction;
 use crate::analysis::{conditioning, solver, time_loop};
 use crate::output::summary::Communication;
 use crate::record::checkpointing::{self, Checkpointer, Restart};
@@ -222,8 +223,9 @@ impl Start<'_> {
         };
         let first = implicit::first_span(&model.deck);
         match model.deck.analysis.kind {
-            AnalysisType::QuasiStatic if resume.is_none() => {
+            kind if kind.is_static() && resume.is_none() => {
                 support::require(world, &model, &points, &active, first)?;
+                support::require_later(world, &model, &points)?;
             }
             AnalysisType::Explicit | AnalysisType::ImplicitDynamic if resume.is_none() => {
                 warnings.extend(support::falls(world, &model, &points, &active, first)?);
@@ -252,7 +254,7 @@ impl Start<'_> {
                 ResultsDirectory::create(out, self.arguments.force, &inputs, comm)?
             }
         };
-        let checkpointer = Checkpointer::new(&model.deck, physics, &results);
+        let checkpointer = Checkpointer::new(&model.deck, &physics, &results);
         let (log, versions, into) = (self.log, self.versions, results.clone());
         let verbose = self.arguments.voice == cli::Voice::Verbose;
         let opening =
@@ -277,6 +279,12 @@ impl Start<'_> {
             AnalysisType::QuasiStatic | AnalysisType::ImplicitDynamic => {
                 let mut analysis = Implicit::new(&run);
                 time_loop::run(&mut run, &mut analysis)
+            }
+            AnalysisType::StrengthReduction => {
+                let mut analysis = StrengthReduction::new(&run);
+                let ending = time_loop::run(&mut run, &mut analysis);
+                run.recorder.strength_factor = analysis.factor();
+                ending
             }
             AnalysisType::Explicit => {
                 let begun = Explicit::new(&mut run);

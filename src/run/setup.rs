@@ -6,7 +6,7 @@ use std::sync::Arc;
 use crate::contact::Contacts;
 use crate::deck::expression::Expression;
 use crate::deck::model::{self, Initial, Load};
-use crate::deck::{Deck, rough};
+use crate::deck::{Deck, Presence, rough};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
@@ -20,16 +20,17 @@ use crate::points::seed::{self, CellByCell};
 use crate::points::share::Share;
 use crate::points::{Named, Points};
 
-use super::materials::{self, Overview};
+use super::materials::{self, Overview, Stresses};
 use super::start_checks::memory;
 use super::surfaces;
 use crate::parallel::balance::Balance;
 use crate::system::model::Model;
 
 /// Builds the model and this rank's points. Collective.
-pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, Points<D>)> {
+pub fn prepare<const D: usize>(world: &World, mut deck: Deck) -> Result<(Model<D>, Points<D>)> {
     memory::require::<D>(world, &deck)?;
     let grid = world.fail_together(build_grid(&deck))?;
+    tell_cells(&mut deck, &grid);
     check_tags(&deck, &grid)?;
     check_basis(&deck, &grid)?;
     let share = Share { rank: world.rank(), ranks: world.size() };
@@ -46,22 +47,74 @@ pub fn prepare<const D: usize>(world: &World, deck: Deck) -> Result<(Model<D>, P
     let mut found = find_carriers(world, &deck, &grid, &points)?;
     hold_constant_forces(&deck, &mut found, &mut points);
     let materials = materials::of_bodies(&deck);
-    materials::equip(world, &deck, &materials, &mut points)?;
-    let model = model_of(world, deck, grid, partition, materials, found, &points)?;
+    materials::equip(world, &deck, &materials, &mut points, Stresses::Initial)?;
+    let mut model = model_of(world, deck, grid, partition, materials, found, &points)?;
     points.slip = Named::zeros(model.contacts.slip_names(&model.deck), points.len());
+    let late = late_bodies(&model.deck);
+    model.waiting = set_aside(&mut points, &late);
     Ok((model, points))
+}
+
+/// Tells the materials how wide the cells are.
+fn tell_cells<const D: usize>(deck: &mut Deck, grid: &Grid<D>) {
+    let cell = grid.cell_size();
+    deck.materials.iter_mut().for_each(|material| material.cell = cell);
+}
+
+/// Which bodies come with a stage after the first.
+fn late_bodies(deck: &Deck) -> Vec<bool> {
+    deck.bodies.iter().map(|body| body.presence.from.is_some_and(|from| from > 0)).collect()
+}
+
+/// Takes the points of some bodies out.
+fn set_aside<const D: usize>(points: &mut Points<D>, bodies: &[bool]) -> Points<D> {
+    if !bodies.contains(&true) {
+        return points.empty_like();
+    }
+    let (gone, kept): (Vec<usize>, Vec<usize>) =
+        (0..points.len()).partition(|&p| bodies[points.body[p] as usize]);
+    let mut aside = points.clone();
+    aside.select(&gone);
+    points.select(&kept);
+    aside
+}
+
+/// All points of the deck as they were seeded, with what their materials ask for: what a
+/// continuation needs of bodies that are not there. Collective.
+fn seeded<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    grid: &Grid<D>,
+    materials: &[Material],
+) -> Result<Points<D>> {
+    let share = Share { rank: world.rank(), ranks: world.size() };
+    let (mut points, _) = world.fail_together(seed::seed(deck, grid, share))?;
+    materials::equip(world, deck, materials, &mut points, Stresses::Initial)?;
+    Ok(points)
 }
 
 /// The model and this rank's points as a checkpoint holds them: the stored partition where it
 /// fits this run, a new one otherwise. Collective.
 pub fn restore<const D: usize>(
     world: &World,
-    deck: Deck,
+    mut deck: Deck,
     restored: Restored<D>,
 ) -> Result<(Model<D>, Points<D>)> {
     let mut grid = world.fail_together(build_grid(&deck))?;
+    tell_cells(&mut deck, &grid);
+    let materials = materials::of_bodies(&deck);
+    let all = match deck.has_passing_bodies() {
+        true => Some(seeded(world, &deck, &grid, &materials)?),
+        false => None,
+    };
     let Restored { ranks, mut points, mesh_positions, brick, owners, .. } = restored;
     points.shed(deck.method.basis);
+    points.water = deck.water();
+    if !points.counts_anew && deck.stages.iter().any(|stage| stage.reset_displacement) {
+        // An earlier part of the run had no such stage.
+        points.counts_anew = true;
+        points.displacement_start.clone_from(&points.position_initial);
+    }
     if let (Grid::Mesh(mesh), Some(positions)) = (&mut grid, mesh_positions) {
         world.fail_together(mesh.set_positions(positions))?;
     }
@@ -71,19 +124,28 @@ pub fn restore<const D: usize>(
         Some(partition) => partition,
         None => Partition::build(world, &grid, deck.parallel.brick, &points, None)?,
     };
-    let materials = materials::of_bodies(&deck);
     materials::equip_restored(world, &deck, &materials, &mut points)?;
     // With the stored partition nothing moves; the points are in the order of their cells.
     parallel::migrate(world, &partition, &grid, &mut points)?;
-    let mut found = find_carriers(world, &deck, &grid, &points)?;
+    let mut found = find_carriers(world, &deck, &grid, all.as_ref().unwrap_or(&points))?;
     // The points have brought theirs.
     hold_constant_forces(&deck, &mut found, &mut Points::<D>::default());
-    let model = model_of(world, deck, grid, partition, materials, found, &points)?;
+    let of_all = all.as_ref().unwrap_or(&points);
+    let mut model = model_of(world, deck, grid, partition, materials, found, of_all)?;
     let names = model.contacts.slip_names(&model.deck);
     let slips = names.iter().any(|names| !names.is_empty());
     if slips && points.slip.names() != names {
         let what = "the checkpoint holds no slip of this deck's contacts: it cannot be continued";
         return Err(Error::File(what.into()));
+    }
+    if let Some(mut all) = all {
+        all.slip = Named::zeros(model.contacts.slip_names(&model.deck), all.len());
+        let mut counts = vec![0.0; model.deck.bodies.len()];
+        points.body.iter().for_each(|&body| counts[body as usize] += 1.0);
+        let counts = world.sum_slice(&counts);
+        let late = late_bodies(&model.deck).into_iter().zip(counts);
+        let waiting: Vec<bool> = late.map(|(late, count)| late && count == 0.0).collect();
+        model.waiting = set_aside(&mut all, &waiting);
     }
     Ok((model, points))
 }
@@ -121,7 +183,7 @@ fn model_of<const D: usize>(
         && contacts.symmetric()
         && loads.iter().all(|load| load.symmetric())
         && !supports.iter().any(|support| support.nitsche);
-    let balance = Balance::default();
+    let (balance, waiting) = (Balance::default(), points.empty_like());
     Ok(Model {
         deck,
         grid,
@@ -135,6 +197,7 @@ fn model_of<const D: usize>(
         contacts,
         manufactured,
         balance,
+        waiting,
     })
 }
 
@@ -271,9 +334,10 @@ fn hold_constant_forces<const D: usize>(
     found: &mut [Found<D>],
     points: &mut Points<D>,
 ) {
-    for (load, found) in deck.loads.iter().zip(found) {
+    for ((load, presence), found) in deck.loads.iter().zip(&deck.load_presence).zip(found) {
         let Load::Point { nearest, force, .. } = load else { continue };
-        if force.iter().any(Expression::depends_on_time) {
+        let passes = deck.is_staged() || *presence != Presence::default();
+        if passes || force.iter().any(Expression::depends_on_time) {
             continue;
         }
         for (id, _) in std::mem::take(&mut found.carriers) {

@@ -1,10 +1,10 @@
 //! Dirichlet conditions: which components of which active nodes move how far in this step.
 
 use crate::basis;
-use crate::deck::Scope;
 use crate::deck::expression::Expression;
 use crate::deck::model::{Basis, Boundary, Place, Rotation};
 use crate::deck::schema::AXES;
+use crate::deck::{Presence, Scope, When};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::parallel::World;
@@ -15,11 +15,33 @@ use super::numbering::Numbering;
 /// Where in the analysis a step lies: load factor and time at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepSpan {
+    /// From zero.
+    pub stage: usize,
+    /// s of the stage.
     pub factor_start: f64,
     pub factor_end: f64,
     /// s
     pub time_start: f64,
     pub time_end: f64,
+}
+
+impl StepSpan {
+    pub fn start(&self) -> When {
+        When { stage: self.stage, factor: self.factor_start, time: self.time_start }
+    }
+
+    pub fn end(&self) -> When {
+        When { stage: self.stage, factor: self.factor_end, time: self.time_end }
+    }
+
+    /// As what is there at certain times sees it: s runs in the stage it comes with, and is 1 later.
+    pub fn seen_by(&self, presence: Presence) -> StepSpan {
+        StepSpan {
+            factor_start: presence.factor(self.start()),
+            factor_end: presence.factor(self.end()),
+            ..*self
+        }
+    }
 }
 
 /// Prescribed increments at the local nodes (owned and ghost).
@@ -57,7 +79,9 @@ impl Conditions {
         // Place in the deck of the boundary that a degree of freedom follows.
         let mut leader = vec![usize::MAX; numbering.len() * D];
         let mut problem = None;
-        for (b, boundary) in boundaries.iter().enumerate() {
+        let held_now = |boundary: &Boundary| boundary.presence.holds_in(span.stage);
+        for (b, boundary) in boundaries.iter().enumerate().filter(|(_, b)| held_now(b)) {
+            let span = span.seen_by(boundary.presence);
             let inside = members(world, grid, basis, numbering, points, &boundary.place)?;
             for local in (0..numbering.len()).filter(|&local| inside[local]) {
                 let node = numbering.nodes[local];
@@ -221,7 +245,7 @@ fn cells_of<const D: usize>(
     Ok(marks.into_iter().map(|mark| mark > 0.0).collect())
 }
 
-/// Increment of a prescribed total displacement over the step. Without `s` or `t` the total is
+/// Increment of a prescribed total displacement over the step, as its boundary sees that. Without `s` or `t` the total is
 /// reached linearly with the load factor.
 fn increment_of<const D: usize>(expression: &Expression, start: &[f64; D], span: StepSpan) -> f64 {
     let mut initial = [0.0; 3];

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use crate::contact::Contacts;
-use crate::deck::Deck;
 use crate::deck::model::{Locking, Tangent};
+use crate::deck::{Deck, When};
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
 use crate::grid::Grid;
-use crate::loads::{self, Load, Manufactured, Moment};
+use crate::loads::{self, Load, Manufactured};
 use crate::material::Material;
 use crate::parallel::balance::Balance;
 use crate::parallel::{Partition, World};
@@ -37,6 +37,8 @@ pub struct Model<const D: usize> {
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
     pub balance: Balance,
+    /// Points of bodies that come with a later stage.
+    pub waiting: Points<D>,
 }
 
 impl<const D: usize> Model<D> {
@@ -64,10 +66,9 @@ impl<const D: usize> Model<D> {
         &self,
         world: &World,
         points: &Points<D>,
-        load_factor: f64,
-        time: f64,
+        when: When,
     ) -> Result<Vec<[f64; D]>> {
-        let at = Moment::new(self.deck.analysis.kind, load_factor, time);
-        world.fail_together(loads::on_points(points, &self.materials, &self.loads, at))
+        let made = loads::on_points(points, &self.materials, &self.loads, &self.deck, when);
+        world.fail_together(made)
     }
 }

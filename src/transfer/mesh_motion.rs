@@ -53,7 +53,8 @@ fn rotation_of<const D: usize>(deck: &Deck, tag: &str, span: StepSpan) -> Option
     deck.boundaries.iter().find_map(|boundary| {
         let rotation = boundary.rotation.as_ref()?;
         let tagged = matches!(&boundary.place, Place::Tag(own) if own == tag);
-        tagged.then(|| {
+        (tagged && boundary.presence.holds_in(span.stage)).then(|| {
+            let span = span.seen_by(boundary.presence);
             let share = span.factor_end - span.factor_start;
             let centre = std::array::from_fn(|a| rotation.centre.get(a).copied().unwrap_or(0.0));
             (centre, rotation.degrees.to_radians() * share)

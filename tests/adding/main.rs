@@ -17,9 +17,10 @@ use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations}
 use mpm_par::analysis::solver::{self, Linear, Shape};
 use mpm_par::basis::contract::{self, Basis};
 use mpm_par::deck;
+use mpm_par::deck::When;
 use mpm_par::deck::model::{self, AnalysisType, Frame, GimpEdge, InvertedIterates};
 use mpm_par::grid::{Grid, Lattice};
-use mpm_par::loads::{self, Load, Moment};
+use mpm_par::loads::{self, Load};
 use mpm_par::material::Model as _;
 use mpm_par::parallel::World;
 use mpm_par::petsc::Session;
@@ -148,7 +149,9 @@ fn rest_on_springs(world: &World, basis: &dyn Basis<2>) {
     };
     let step = mesh.step_points(&points, &model.materials);
     let numbering = &mesh.numbering;
-    let weights = model.point_forces(world, &points, 1.0, 1.0).expect("gravity");
+    let weights = model
+        .point_forces(world, &points, When { stage: 0, factor: 1.0, time: 1.0 })
+        .expect("gravity");
     let mut external = vec![0.0; numbering.len() * 2];
     for (p, force) in weights.iter().enumerate() {
         let shares = &step.influences.weights[step.influences.row(p)];
@@ -321,8 +324,11 @@ fn blow(universe: &Universe) {
         coefficient: 0.8,
     };
     let all: Vec<Box<dyn Load<2>>> = vec![Box::new(wind)];
-    let at = Moment::new(AnalysisType::QuasiStatic, 0.5, 0.5);
-    let forces = loads::on_points(&points, &model.materials, &all, at).expect("forces");
+    let when = When { stage: 0, factor: 0.5, time: 0.5 };
+    // Half of the load at half of the steps.
+    let mut deck = model.deck.clone();
+    deck.analysis.kind = AnalysisType::QuasiStatic;
+    let forces = loads::on_points(&points, &model.materials, &all, &deck, when).expect("forces");
     let total = world.sum(forces.iter().map(|f| f[0]).sum());
     let wanted = 0.5 * (0.8 * 1.25 * 25.0 * 25.0 * 3.0 * 3.0 / 40.0);
     assert!((total / wanted - 1.0).abs() < 1e-12, "{total} {wanted}");

@@ -34,7 +34,7 @@ use report::{Sample, machine, resident_bytes, sample, sample_parts};
 /// Newton iterations a step takes on the average: shares the cost of what runs once per step.
 const ITERATIONS_PER_STEP: f64 = 4.0;
 const SPAN: StepSpan =
-    StepSpan { factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 0.0 };
+    StepSpan { stage: 0, factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 0.0 };
 
 struct Case {
     name: &'static str,

@@ -40,6 +40,37 @@ pub const SECTIONS: &[Section] = &[
                 .unit("m/s").read_by(&[super::DYNAMIC]),
             key("overlap", Choice(&["refuse", "allow"]), Default("\"refuse\""),
                 "Bodies that lie in one place are refused, as mass counts twice there, unless one of the two allows it."),
+            key("initial_stress", Table("body.initial_stress"), Optional("free of stress"),
+                "Effective Cauchy stress before the first step, tension positive.")
+                .read_by(&[super::LOADED]),
+            key("from", Text, Optional("initial"),
+                "The stage it comes with; \"initial\": it has been there before the first one.")
+                .read_by(&[super::LOADED]),
+            key("until", Text, Optional("it stays"), "The last stage in which it is there.")
+                .read_by(&[super::LOADED]),
+        ],
+    },
+    Section {
+        name: "body.initial_stress",
+        header: "body.initial_stress",
+        doc: "Either components, or K0: unit_weight, surface and k0. The place at the start is the reference: F = 1 under this stress. Gravity whose values hold neither s nor t then acts in full from the first step on, as if it had `from = \"initial\"`; other loads that the stress balances need that key. What is not in balance acts in the first step. With `[water]` the vertical effective stress is the weight of what lies above, of soil and of water that stands on the surface, less the pore pressure. Points outside the yield surface are refused.",
+        keys: &[
+            key("xx", Expression("X Y Z"), Optional("0"), "Normal stress.").unit("Pa"),
+            key("yy", Expression("X Y Z"), Optional("0"), "Normal stress.").unit("Pa"),
+            key("zz", Expression("X Y Z"), Optional("0"), "Normal stress.").unit("Pa"),
+            key("xy", Expression("X Y Z"), Optional("0"), "Shear stress.").unit("Pa"),
+            key("yz", Expression("X Y Z"), Optional("0"), "Shear stress, in 3D.").unit("Pa"),
+            key("xz", Expression("X Y Z"), Optional("0"), "Shear stress, in 3D.").unit("Pa"),
+            key("unit_weight", Expression("X Y Z"), Optional("K0 needs it"),
+                "Weight per volume of what lies above, water in the pores included.").unit("N/m3").range(at_least(0.0)),
+            key("surface", Expression("X Y Z"), Optional("K0 needs it"),
+                "Height of the ground's surface along the axis.").unit("m"),
+            key("k0", Expression("X Y Z"), Optional("K0 needs it"),
+                "Horizontal over vertical effective stress.").range(at_least(0.0)),
+            key("surcharge", Expression("X Y Z"), Optional("0"), "Pressure on the surface.")
+                .unit("Pa").range(at_least(0.0)),
+            key("axis", Choice(&AXES), Optional("the last one: y in 2D, z in 3D"),
+                "The vertical axis, upwards."),
         ],
     },
     Section {
@@ -155,6 +186,11 @@ pub const SECTIONS: &[Section] = &[
             key("method", Choice(SupportMethod::NAMES), Optional("\"penalty\"; only with surface"),
                 "nitsche: the material's own stress supplies the traction there, and the penalty bears what is left, so that it can be small: more exact, with an unsymmetric tangent.")
                 .read_by(&[super::IMPLICIT]),
+            key("from", Text, Optional("the first stage"),
+                "The stage it comes with; \"initial\": it has been there before the first one.")
+                .read_by(&[super::LOADED]),
+            key("until", Text, Optional("it stays"), "The last stage in which it is there.")
+                .read_by(&[super::LOADED]),
         ],
     },
     Section {
@@ -213,7 +249,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "load",
         header: "[[load]]",
-        doc: "Exactly one of the keys. Values are numbers or expressions. In quasi-static analyses a value that holds neither s nor t grows with s; one that holds s or t is taken as it is.",
+        doc: "Exactly one of the keys but from and until. Values are numbers or expressions. In quasi-static analyses a value that holds neither s nor t grows with s; one that holds s or t is taken as it is.",
         keys: &[
             key("point", Table("load.point"), Optional("-"), "Force held by material points."),
             key("gravity", Expressions("X Y Z s t"), Optional("-"), "Acceleration.").unit("m/s2"),
@@ -226,6 +262,22 @@ pub const SECTIONS: &[Section] = &[
                 "Dead load per initial area on a body's surface."),
             key("manufactured", Expressions("X Y Z s"), Optional("-"),
                 "The body force that makes this displacement field exact.").unit("m"),
+            key("from", Text, Optional("the first stage; initial for a constant gravity in a deck with initial_stress"),
+                "The stage it comes with; \"initial\": it has been there before the first one.")
+                .read_by(&[super::LOADED]),
+            key("until", Text, Optional("it stays"), "The last stage in which it is there.")
+                .read_by(&[super::LOADED]),
+        ],
+    },
+    Section {
+        name: "water",
+        header: "[water]",
+        doc: "Still water in the pores of all bodies and around them: the pore pressure is unit_weight (level - height), and 0 above the level, whatever the bodies do. Materials respond with their effective stress; the field `stress` is the total one, effective_stress - pore_pressure. What is below the level is lifted by unit_weight times its volume (at the start of a step), as the gradient of the pore pressure does; densities are those with the water in the pores. Reactions are those of the effective stress. The lift ramps like a load, and acts in full from the first step on where a body has initial_stress.",
+        keys: &[
+            key("level", Number, Required, "Height of the water table.").unit("m"),
+            key("unit_weight", Number, Default("9.81e3"), "Unit weight of water.").unit("N/m3").range(POSITIVE),
+            key("axis", Choice(&AXES), Optional("the last one: y in 2D, z in 3D"),
+                "The vertical axis, upwards."),
         ],
     },
     Section {

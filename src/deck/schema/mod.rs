@@ -126,20 +126,28 @@ const fn only(choice: &'static str, values: &'static [&'static str]) -> Reader {
 }
 
 /// Analyses that solve equilibrium by iterations.
-const IMPLICIT: Reader = only("analysis.type", &["quasi-static", "implicit-dynamic"]);
-const QUASI_STATIC: Reader = only("analysis.type", &["quasi-static"]);
+const IMPLICIT: Reader =
+    only("analysis.type", &["quasi-static", "strength-reduction", "implicit-dynamic"]);
+const QUASI_STATIC: Reader = only("analysis.type", &["quasi-static", "strength-reduction"]);
+const STRENGTH_REDUCTION: Reader = only("analysis.type", &["strength-reduction"]);
 const EXPLICIT: Reader = only("analysis.type", &["explicit"]);
 const IMPLICIT_DYNAMIC: Reader = only("analysis.type", &["implicit-dynamic"]);
 /// Analyses in which the bodies have inertia.
 const DYNAMIC: Reader = only("analysis.type", &["explicit", "implicit-dynamic"]);
 /// Analyses that move the bodies by forces.
-const LOADED: Reader = only("analysis.type", &["quasi-static", "explicit", "implicit-dynamic"]);
+const LOADED: Reader =
+    only("analysis.type", &["quasi-static", "strength-reduction", "explicit", "implicit-dynamic"]);
 /// Analyses with a stiffness matrix, and with a mass matrix: what Ghost stabilises.
-const STIFF: Reader = only("analysis.type", &["quasi-static", "implicit-dynamic", "conditioning"]);
+const STIFF: Reader = only(
+    "analysis.type",
+    &["quasi-static", "strength-reduction", "implicit-dynamic", "conditioning"],
+);
 const HEAVY: Reader = only("analysis.type", &["explicit", "implicit-dynamic", "conditioning"]);
 /// Analyses of bodies on a grid.
-const ON_GRID: Reader =
-    only("analysis.type", &["quasi-static", "explicit", "implicit-dynamic", "conditioning"]);
+const ON_GRID: Reader = only(
+    "analysis.type",
+    &["quasi-static", "strength-reduction", "explicit", "implicit-dynamic", "conditioning"],
+);
 const ELEMENT_TEST: Reader = only("analysis.type", &["element-test"]);
 const GIMP: Reader = only("method.basis", &["gimp"]);
 

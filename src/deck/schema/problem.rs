@@ -7,7 +7,7 @@ use super::Kind::{
 use super::Need::{Default, Optional, Required};
 use super::{
     DYNAMIC, ELEMENT_TEST, EXPLICIT, GIMP, HEAVY, IMPLICIT, IMPLICIT_DYNAMIC, LOADED, ON_GRID,
-    POSITIVE, QUASI_STATIC, STIFF, Section, at_least, between, key, only,
+    POSITIVE, QUASI_STATIC, STIFF, STRENGTH_REDUCTION, Section, at_least, between, key, only,
 };
 use crate::deck::fields::FIELD_NAMES;
 use crate::deck::model::{
@@ -42,6 +42,11 @@ pub const SECTIONS: &[Section] = &[
                 .read_by(&[LOADED]),
             key("contact", Tables("contact"), Optional("none"), "Which bodies touch which rigid bodies.")
                 .read_by(&[LOADED]),
+            key("water", Table("water"), Optional("dry"), "Still water at a given level.")
+                .read_by(&[LOADED]),
+            key("stage", Tables("stage"), Optional("one stage of analysis.steps"),
+                "Stages in their order: what comes, goes and ramps in each.")
+                .read_by(&[LOADED]),
             key("verify", Tables("verify"), Optional("none"), "Figures of merit.")
                 .read_by(&[ON_GRID]),
             key("probe", Tables("probe"), Optional("none"), "Points that are watched.")
@@ -69,9 +74,9 @@ pub const SECTIONS: &[Section] = &[
             key("symmetry", Choice(Symmetry::NAMES), Default("\"plane-strain\""),
                 "What a problem in two dimensions stands for. plane-strain: a slice of unit thickness. axisymmetric: half of a section through a body of revolution, x the radius (not below 0) and y the axis; zz is the hoop direction. Volumes, masses, forces, reactions and energies are those of the whole turn, and grid nodes on the axis keep x = 0. Bases mpm and gimp.")
                 .read_by(&[ON_GRID]),
-            key("steps", Count, Optional("needed, except with cfl and in element tests"),
+            key("steps", Count, Optional("needed, except with cfl, with [[stage]] and in element tests"),
                 "Equal load steps or time steps.").range(at_least(1.0)),
-            key("duration", Number, Optional("needed by dynamics, only there"),
+            key("duration", Number, Optional("needed by dynamics without [[stage]], only there"),
                 "Simulated time; the time step is duration / steps.").unit("s").range(POSITIVE),
             key("cfl", Number, Optional("explicit only, instead of steps"),
                 "Time step as a fraction of the stability limit.").range(POSITIVE),
@@ -107,6 +112,41 @@ pub const SECTIONS: &[Section] = &[
                 "Implicit dynamics: numerical damping; sets Newmark's beta and gamma.")
                 .range(between(-1.0 / 3.0, 0.0))
                 .read_by(&[IMPLICIT_DYNAMIC]),
+            key("strength_tolerance", Number, Default("0.005"),
+                "Strength reduction: relative width of the bracket that ends the search. The run first goes through its steps, or stages, with the strength as it is; then cohesions, tensions, shear strengths and yield stresses, and the tangents of friction and dilation angles, are divided by a factor that grows until no equilibrium is found in a single step (Newton's method fails, or the displacement jumps: a node moves by more than a cell, or by a hundred times as much per relative change of the factor as in the calmest trial), and the bracket is halved. The middle is strength_factor of summary.json.")
+                .range(super::Range { low_included: false, ..between(0.0, 1.0) })
+                .read_by(&[STRENGTH_REDUCTION]),
+            key("damping", Table("analysis.damping"), Optional("none"),
+                "Slows the nodes down, for states of rest as the limit of a motion.")
+                .read_by(&[DYNAMIC]),
+        ],
+    },
+    Section {
+        name: "analysis.damping",
+        header: "analysis.damping",
+        doc: "What it takes from the energy is `dissipation_damping` of history.csv. It acts at the nodes and takes momentum from free motion, too: it is for bodies that come to rest, not for flight or fall.",
+        keys: &[
+            key("local", Number, Optional("0"),
+                "Local non-viscous damping: this share of the force out of balance on each component of each node acts against its velocity; 0.7 to 0.8 is usual. It does not depend on frequencies or units (explicit: of the acceleration, which with a lumped mass is the same; implicit: of that at the step's start).")
+                .range(super::Range { high_included: false, ..between(0.0, 1.0) }),
+            key("mass", Number, Optional("0"),
+                "Mass-proportional damping: this times the momentum acts against the velocity. A mode of circular frequency w is damped by mass / (2 w) of the critical damping.")
+                .unit("1/s").range(at_least(0.0)),
+        ],
+    },
+    Section {
+        name: "stage",
+        header: "[[stage]]",
+        doc: "A part of the analysis, in the order of the deck. Bodies, boundaries and loads come and go by the names of stages (`from`, `until`); `from = \"initial\"` says that something has acted before the first stage. s runs from 0 to 1 in each stage. What comes with a stage ramps with s over it (in quasi-static analyses, and loads alone: a boundary's displacement and a body's weight are ramped likewise) and keeps its full value in later stages, where its formulas see s = 1. What goes falls to nothing over its last stage. A body that goes leaves a quasi-static analysis at the start of its last stage; the forces that it and boundaries of that stage held then fall to zero in proportion to 1 - s. In dynamics its points stay to the end of the stage, with a share 1 - s of their stress and weight, and a boundary holds to the end of its last stage. A body that comes is free of stress unless it has initial_stress, and where the deck puts it. Without time t counts stages: it is the number of those before plus s. Work done by what comes and goes is in work_external; the energy of points that have gone is in no column.",
+        keys: &[
+            key("name", Text, Optional("stage-1, stage-2, ..."), "Its name, unique; not \"initial\"."),
+            key("steps", Count, Optional("needed, except with cfl"),
+                "Equal load steps or time steps of this stage.").range(at_least(1.0)),
+            key("duration", Number, Optional("needed by dynamics, only there"),
+                "Simulated time of this stage.").unit("s").range(POSITIVE)
+                .read_by(&[DYNAMIC]),
+            key("reset_displacement", Flag, Optional("false"),
+                "The field `displacement` counts from the start of this stage. Nothing else changes."),
         ],
     },
     Section {

@@ -1,7 +1,8 @@
 //! `[analysis]`, `[method]`, `[conditioning]`.
 
 use crate::deck::model::{
-    AffineTransfer, Analysis, AnalysisType, Basis, GimpEdge, Locking, Mass, Method, StressUpdate,
+    AffineTransfer, Analysis, AnalysisType, Basis, Damping, GimpEdge, Locking, Mass, Method,
+    StressUpdate,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -10,7 +11,8 @@ use crate::deck::tree::Value;
 
 use super::ghost::Wanted;
 
-pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
+/// `staged`: the stages have steps and durations.
+pub fn analysis(table: &Table<'_>, staged: bool) -> Got<Analysis> {
     let kind: Got<AnalysisType> = table.choice("type");
     let symmetry = table.choice("symmetry");
     let steps = table.count_if("steps");
@@ -24,8 +26,10 @@ pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
     let tangent = table.choice("tangent");
     let newmark = (table.number("newmark_beta"), table.number("newmark_gamma"));
     let hht_alpha = table.number("hht_alpha");
+    let strength_tolerance = table.number("strength_tolerance");
+    let damping = table.table_if("damping", |table| damping(&table));
     let kind = kind?;
-    let timing = timing(table, kind);
+    let timing = timing(table, kind, staged);
     let (newmark_beta, newmark_gamma, hht_alpha) = (newmark.0?, newmark.1?, hht_alpha?);
     let (newmark_beta, newmark_gamma) = if hht_alpha == 0.0 {
         stable_newmark(table, newmark_beta, newmark_gamma)?;
@@ -60,11 +64,21 @@ pub fn analysis(table: &Table<'_>) -> Got<Analysis> {
         newmark_beta,
         newmark_gamma,
         hht_alpha,
+        strength_tolerance: strength_tolerance?,
+        damping: damping?,
     })
 }
 
+fn damping(table: &Table<'_>) -> Got<Damping> {
+    let (local, mass) = (table.number_if("local")?, table.number_if("mass")?);
+    if local.is_none() && mass.is_none() {
+        return Err(table.problem("", "damps nothing: expected \"local\", \"mass\" or both"));
+    }
+    Ok(Damping { local: local.unwrap_or(0.0), mass: mass.unwrap_or(0.0) })
+}
+
 /// Which of steps, duration and cfl the kind of analysis takes.
-fn timing(table: &Table<'_>, kind: AnalysisType) -> Got<()> {
+fn timing(table: &Table<'_>, kind: AnalysisType, staged: bool) -> Got<()> {
     let dynamic = kind.has_time();
     let name = kind.name();
     let mut result = Ok(());
@@ -72,7 +86,10 @@ fn timing(table: &Table<'_>, kind: AnalysisType) -> Got<()> {
         let why = "type = \"element-test\" counts its steps in element_test.steps";
         return table.refuse(&["steps", "duration", "cfl"], why);
     }
-    if dynamic && !table.given("duration") {
+    if staged {
+        result = table.refuse(&["steps", "duration"], "each [[stage]] has its own");
+    }
+    if dynamic && !table.given("duration") && !staged {
         result = Err(table.missing("duration", &format!("type = \"{name}\" needs it")));
     }
     if !dynamic {
@@ -87,7 +104,7 @@ fn timing(table: &Table<'_>, kind: AnalysisType) -> Got<()> {
         let why = "steps and cfl exclude each other: give the number of steps, or the fraction of the stability limit";
         return result.and(table.refuse(&["steps"], why));
     }
-    if !table.given("steps") {
+    if !table.given("steps") && !staged {
         let or = if kind == AnalysisType::Explicit { "or give cfl" } else { "" };
         result = result.and(Err(table.missing("steps", or)));
     }

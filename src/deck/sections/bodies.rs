@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use super::shapes;
+use super::{initial_stress, shapes, stages};
 use crate::deck::expression::Expression;
 use crate::deck::model::{
-    Analysis, AnalysisType, Basis, Body, BodySource, Grid, LatticeGrid, MeshMotion, MeshSource,
-    Method, Seeding,
+    Analysis, Basis, Body, BodySource, Grid, LatticeGrid, MeshMotion, MeshSource, Method, Seeding,
 };
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema::AXES;
+use crate::deck::stage::Presence;
 use crate::deck::tree::Value;
 
 /// What bodies and conditions are judged against; parts that could not be read are absent.
@@ -20,6 +20,8 @@ pub struct World<'a> {
     pub grid: &'a Grid,
     pub analysis: Option<&'a Analysis>,
     pub method: Option<&'a Method>,
+    /// Names of the stages.
+    pub stages: &'a [String],
 }
 
 /// Largest modulus and density: sums over bodies of any size stay finite.
@@ -76,6 +78,9 @@ pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
         let velocity = table.expressions_if("velocity", world.dimension);
         let overlap = table.choice_of("overlap", &["refuse", "allow"]);
         let source = table.table("shape", |shape| source(&table, &shape, world));
+        let stress =
+            table.table_if("initial_stress", |t| initial_stress::read(&t, world.dimension));
+        let presence = stages::presence(&table, world.stages, Presence::BEFORE);
         let rest = || vec![Expression::constant(0.0); world.dimension];
         Ok(Body {
             name: names[index].clone(),
@@ -84,6 +89,8 @@ pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
             source: source?,
             velocity: velocity?.unwrap_or_else(rest),
             may_overlap: overlap? == 1,
+            initial_stress: stress?,
+            presence: presence?,
         })
     })?;
     if bodies.is_empty() {
@@ -113,7 +120,7 @@ fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {
 fn density(table: &Table<'_>, world: &World<'_>) -> Got<f64> {
     let density = finite_sums(table, "density", table.number_if("density")?.unwrap_or(0.0))?;
     if let Some(kind) = world.analysis.map(|analysis| analysis.kind)
-        && kind != AnalysisType::QuasiStatic
+        && !kind.is_static()
         && density <= 0.0
     {
         let message = format!("expected > 0 kg/m3: analysis.type = \"{}\" needs mass", kind.name());

@@ -1,15 +1,16 @@
 //! `[[boundary]]` and `[[load]]`.
 
 use super::bodies::{self, World};
-use super::{shapes, surfaces};
+use super::{shapes, stages, surfaces};
 use crate::deck::expression::Variable;
 use crate::deck::model::{
-    Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone, Rotation, Support,
-    SupportMethod,
+    AnalysisType, Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone, Rotation,
+    Support, SupportMethod, Water,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, SIDES};
+use crate::deck::stage::Presence;
 
 /// Penalty factors where the deck says nothing.
 const PENALTY: f64 = 100.0;
@@ -50,14 +51,26 @@ pub fn boundaries(
             let centre = centre?.unwrap_or_else(|| vec![0.0; world.dimension]);
             Ok(Rotation { centre, degrees: degrees? })
         });
-        let (place, fix) = (place?, fix?);
+        let kind = world.analysis.map(|analysis| analysis.kind);
+        let fades = kind.is_some_and(AnalysisType::is_static);
+        let presence = Presence { fades, ..Presence::default() };
+        let presence = stages::presence(&table, world.stages, presence);
+        let (place, fix, presence) = (place?, fix?, presence?);
         let (displacement, rotation) = (displacement?.unwrap_or_default(), rotation?);
         if let Place::Surface(support) = &place {
             table.refuse(&["rotation"], "not known of a surface; use displacement = { ... }")?;
             if support.slip {
                 table.refuse(&["fix"], "slip holds the normal component already")?;
             }
-            return checked(&table, Boundary { name, place, fix, displacement, rotation });
+            if presence.from.is_some_and(|from| from > 0) {
+                let what = "a surface is held where it was at the start, from the first stage on";
+                let help = "hold grid nodes: where = { ... }";
+                return Err(table.problem_with_help("from", what, help));
+            }
+            return checked(
+                &table,
+                Boundary { name, place, fix, displacement, rotation, presence },
+            );
         }
         table
             .refuse(&["slip", "penalty", "method"], "only with surface; nodes are held exactly")?;
@@ -71,7 +84,7 @@ pub fn boundaries(
         {
             return Err(table.problem("rotation", "x and y are prescribed already"));
         }
-        checked(&table, Boundary { name, place, fix, displacement, rotation })
+        checked(&table, Boundary { name, place, fix, displacement, rotation, presence })
     })
 }
 
@@ -168,88 +181,131 @@ pub(super) fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
     }
 }
 
-/// `read`: the bodies as read, if that succeeded; `names`: as written.
+/// The loads and when they act. `read`: the bodies as read, if that succeeded; `names`: as written.
 pub fn loads(
     root: &Table<'_>,
     world: &World<'_>,
     names: &[String],
     read: Option<&[Body]>,
-) -> Got<Vec<Load>> {
+) -> Got<(Vec<Load>, Vec<Presence>)> {
     let dimension = world.dimension;
-    root.tables("load", |_, table| {
-        let key = table.one_of(&[
-            "point",
-            "gravity",
-            "body_force",
-            "pressure",
-            "traction",
-            "manufactured",
-        ])?;
-        match key {
-            "point" => table.table("point", |t| {
-                let body = of_body(&t, names);
-                let (nearest, force) =
-                    (t.points("nearest", dimension), t.expressions_if("force", dimension));
-                let (nearest, force) = (nearest?, force?);
-                let force = force.ok_or_else(|| t.missing("force", ""));
-                if nearest.is_empty() {
-                    return Err(t.problem("nearest", "expected one or more positions, found none"));
-                }
-                Ok(Load::Point { body: body?, nearest, force: force? })
-            }),
-            "gravity" => {
-                let gravity = table.expressions_if("gravity", dimension)?;
-                let gravity = gravity.ok_or_else(|| table.missing("gravity", ""))?;
-                let acts = gravity.iter().any(|g| g.as_constant() != Some(0.0));
-                let weightless = read.is_some_and(|all| all.iter().all(|b| b.density == 0.0));
-                if weightless && acts {
-                    return Err(
-                        table.problem("gravity", "acts on nothing: every body has density 0")
-                    );
-                }
-                if let (Some(all), Some(light)) = (read, bodies::without_density(root))
-                    && acts
-                {
-                    let name = &all[light].name;
-                    let what = format!("body \"{name}\" has no density, and others have one");
-                    let help = "give it a density; density = 0.0 says that it is to be weightless";
-                    return Err(table.problem_with_help("gravity", what, help));
-                }
-                Ok(Load::Gravity(gravity))
-            }
-            "traction" => table.table("traction", |t| {
-                let surface = surfaces::body_surface(&t, dimension, names, read);
-                let value = t.expressions_if("value", dimension)?;
-                let value = value.ok_or_else(|| t.missing("value", ""))?;
-                Ok(Load::Traction { surface: surface?, value })
-            }),
-            "pressure" => table.table("pressure", |t| {
-                let value = t.expression_if("value");
-                let zone = t.table_if("where", |t| {
-                    let corners = t.table("box", |t| shapes::corners(&t, dimension, true));
-                    let ((min, max), fade) = (corners?, t.number_if("fade")?);
-                    Ok(PressureZone { min, max, fade })
-                });
-                let value = value?.ok_or_else(|| t.missing("value", ""))?;
-                if dimension == 2 && value.depends_on(Variable::CurrentZ) {
-                    return Err(t.problem("value", "z is not known here: the problem is 2D"));
-                }
-                if let Err(why) = value.averaged() {
-                    return Err(t.problem("value", why));
-                }
-                if !t.given("surface") {
-                    return Ok(Load::Pressure { value, zone: zone? });
-                }
-                t.refuse(&["where"], "surface has a where of its own")?;
-                let surface =
-                    t.table("surface", |t| surfaces::body_surface(&t, dimension, names, read));
-                Ok(Load::SurfacePressure { surface: surface?, value })
-            }),
-            _ => {
-                let all = table.expressions_if(key, dimension)?;
-                let all = all.ok_or_else(|| table.missing(key, ""))?;
-                Ok(if key == "body_force" { Load::BodyForce(all) } else { Load::Manufactured(all) })
-            }
-        }
+    let stressed = read.is_some_and(|all| all.iter().any(|body| body.initial_stress.is_some()));
+    let all = root.tables("load", |_, table| {
+        let load = load(root, &table, dimension, names, read)?;
+        // Weight that the initial stress balances has acted before.
+        let balanced = stressed && matches!(load, Load::Gravity(_)) && !load.depends_on_time();
+        let default = if balanced { Presence::BEFORE } else { Presence::default() };
+        // Functions of s or t are taken as they are.
+        let once = load.depends_on_time() && table.given("from") && same(&table, "from", "until");
+        let presence =
+            stages::presence(&table, world.stages, Presence { fades: !once, ..default })?;
+        Ok((load, presence))
+    })?;
+    Ok(all.into_iter().unzip())
+}
+
+/// `[water]`, and when it acts.
+pub fn water(
+    root: &Table<'_>,
+    dimension: usize,
+    read: Option<&[Body]>,
+) -> Got<Option<(Load, Presence)>> {
+    root.table_if("water", |table| {
+        let (level, unit_weight) = (table.number("level"), table.number("unit_weight"));
+        let axis = match table.given("axis") {
+            true => table.choice_of("axis", &AXES[..dimension]),
+            false => Ok(dimension - 1),
+        };
+        let stressed = read.is_some_and(|all| all.iter().any(|body| body.initial_stress.is_some()));
+        let presence = if stressed { Presence::BEFORE } else { Presence::default() };
+        let water = Water { level: level?, unit_weight: unit_weight?, axis: axis? };
+        Ok((Load::Water(water), presence))
     })
+}
+
+/// Whether two keys have the same text.
+fn same(table: &Table<'_>, one: &str, other: &str) -> bool {
+    let text = |key: &str| table.text_if(key).ok().flatten();
+    text(one).is_some() && text(one) == text(other)
+}
+
+fn load(
+    root: &Table<'_>,
+    table: &Table<'_>,
+    dimension: usize,
+    names: &[String],
+    read: Option<&[Body]>,
+) -> Got<Load> {
+    let key = table.one_of(&[
+        "point",
+        "gravity",
+        "body_force",
+        "pressure",
+        "traction",
+        "manufactured",
+    ])?;
+    match key {
+        "point" => table.table("point", |t| {
+            let body = of_body(&t, names);
+            let (nearest, force) =
+                (t.points("nearest", dimension), t.expressions_if("force", dimension));
+            let (nearest, force) = (nearest?, force?);
+            let force = force.ok_or_else(|| t.missing("force", ""));
+            if nearest.is_empty() {
+                return Err(t.problem("nearest", "expected one or more positions, found none"));
+            }
+            Ok(Load::Point { body: body?, nearest, force: force? })
+        }),
+        "gravity" => {
+            let gravity = table.expressions_if("gravity", dimension)?;
+            let gravity = gravity.ok_or_else(|| table.missing("gravity", ""))?;
+            let acts = gravity.iter().any(|g| g.as_constant() != Some(0.0));
+            let weightless = read.is_some_and(|all| all.iter().all(|b| b.density == 0.0));
+            if weightless && acts {
+                return Err(table.problem("gravity", "acts on nothing: every body has density 0"));
+            }
+            if let (Some(all), Some(light)) = (read, bodies::without_density(root))
+                && acts
+            {
+                let name = &all[light].name;
+                let what = format!("body \"{name}\" has no density, and others have one");
+                let help = "give it a density; density = 0.0 says that it is to be weightless";
+                return Err(table.problem_with_help("gravity", what, help));
+            }
+            Ok(Load::Gravity(gravity))
+        }
+        "traction" => table.table("traction", |t| {
+            let surface = surfaces::body_surface(&t, dimension, names, read);
+            let value = t.expressions_if("value", dimension)?;
+            let value = value.ok_or_else(|| t.missing("value", ""))?;
+            Ok(Load::Traction { surface: surface?, value })
+        }),
+        "pressure" => table.table("pressure", |t| {
+            let value = t.expression_if("value");
+            let zone = t.table_if("where", |t| {
+                let corners = t.table("box", |t| shapes::corners(&t, dimension, true));
+                let ((min, max), fade) = (corners?, t.number_if("fade")?);
+                Ok(PressureZone { min, max, fade })
+            });
+            let value = value?.ok_or_else(|| t.missing("value", ""))?;
+            if dimension == 2 && value.depends_on(Variable::CurrentZ) {
+                return Err(t.problem("value", "z is not known here: the problem is 2D"));
+            }
+            if let Err(why) = value.averaged() {
+                return Err(t.problem("value", why));
+            }
+            if !t.given("surface") {
+                return Ok(Load::Pressure { value, zone: zone? });
+            }
+            t.refuse(&["where"], "surface has a where of its own")?;
+            let surface =
+                t.table("surface", |t| surfaces::body_surface(&t, dimension, names, read));
+            Ok(Load::SurfacePressure { surface: surface?, value })
+        }),
+        _ => {
+            let all = table.expressions_if(key, dimension)?;
+            let all = all.ok_or_else(|| table.missing(key, ""))?;
+            Ok(if key == "body_force" { Load::BodyForce(all) } else { Load::Manufactured(all) })
+        }
+    }
 }

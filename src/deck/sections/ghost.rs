@@ -79,7 +79,9 @@ impl Wanted {
             Wanted::Default(scaling) => scaling,
         };
         let weighs = match kind {
-            AnalysisType::QuasiStatic | AnalysisType::ElementTest => false,
+            AnalysisType::QuasiStatic
+            | AnalysisType::StrengthReduction
+            | AnalysisType::ElementTest => false,
             AnalysisType::Conditioning => true,
             AnalysisType::Explicit | AnalysisType::ImplicitDynamic => mass == Mass::Consistent,
         };

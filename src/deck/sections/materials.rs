@@ -26,7 +26,7 @@ fn material(name: &str, table: &Table<'_>, analysis: Option<&Analysis>) -> Got<M
     let parameters = parameters(table, model);
     foreign?;
     alternatives?;
-    let material = Material { name: name.to_string(), model, parameters: parameters? };
+    let material = Material { name: name.to_string(), model, parameters: parameters?, cell: 0.0 };
     let values = material.values(&Scope::default());
     if !material.varies() {
         check_stiffness(table, model, &values, analysis)?;

@@ -8,9 +8,11 @@
 //! | `ghost.rs` | ghost, and what is in force without it |
 //! | `grid.rs` | grid |
 //! | `materials.rs` | material |
+//! | `stages.rs` | stage, `from` and `until` |
 //! | `bodies.rs` | body |
+//! | `initial_stress.rs` | body.initial_stress |
 //! | `shapes.rs` | body.shape |
-//! | `conditions.rs` | boundary, load |
+//! | `conditions.rs` | boundary, load, water |
 //! | `surfaces.rs` | boundary.surface, and the surfaces of loads |
 //! | `contact.rs` | rigid, contact |
 //! | `restraint.rs` | whether rigid motion is held |
@@ -26,12 +28,14 @@ mod contact;
 mod element_test;
 mod ghost;
 mod grid;
+mod initial_stress;
 mod materials;
 mod petsc;
 mod probes;
 mod restraint;
 mod results;
 mod shapes;
+mod stages;
 mod surfaces;
 
 use std::path::Path;
@@ -47,7 +51,10 @@ use super::tree::Node;
 pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let root = Table::open(problems, schema::section(""), "", root)?;
     let title = root.text("title");
-    let analysis = root.table("analysis", |table| analysis::analysis(&table));
+    let staged = root.given("stage");
+    let mut analysis = root.table("analysis", |table| analysis::analysis(&table, staged));
+    let stages = stages::stages(&root, &mut analysis);
+    let stage_names = stages::names(&root);
     let ghost = ghost::wanted(&root);
     let kind = analysis.as_ref().ok().map(|analysis| analysis.kind);
     let method = root
@@ -71,6 +78,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         grid: &grid,
         analysis: analysis.as_ref().ok(),
         method: method.as_ref().ok(),
+        stages: &stage_names,
     };
     let bodies = bodies::bodies(&root, &world);
     let names = bodies::names(&root);
@@ -87,26 +95,49 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         });
         grid_problems?;
     }
-    // What a rigid body holds is known once its corners are.
-    let touched = !matches!(&contacts, Ok(contacts) if contacts.is_empty());
-    if let (Ok(analysis), Ok(boundaries), Ok(loads), false) =
-        (&analysis, &boundaries, &loads, touched)
+    if let (Ok(analysis), Ok(stages), Ok(boundaries), Ok(loads)) =
+        (&analysis, &stages, &boundaries, &loads)
     {
-        restraint::check(&root, analysis, (boundaries, loads), dimension)?;
+        // What a rigid body holds is known once its corners are.
+        if matches!(&contacts, Ok(contacts) if contacts.is_empty()) {
+            restraint::check(&root, analysis, stages, (boundaries, &loads.0), dimension)?;
+        } else if let Ok(bodies) = &bodies {
+            stages::keeps_what_touches(&root, analysis.kind, bodies, boundaries)?;
+        }
+        if let (true, Ok(bodies)) = (staged, &bodies) {
+            let loads = (&loads.0[..], &loads.1[..]);
+            stages::check(&root, analysis.kind, stages, bodies, boundaries, loads)?;
+        }
     }
-    let (analysis, method) = (analysis?, method?);
+    if let (Ok(analysis), Ok(materials), Ok(bodies)) = (&analysis, &materials, &bodies)
+        && analysis.kind == AnalysisType::StrengthReduction
+        && !bodies.iter().any(|body| materials[body.material].has_strength())
+    {
+        let what = "no body has a material with a strength that could be reduced";
+        let help = "for example model = \"mohr-coulomb\"";
+        return root.table("analysis", |table| Err(table.problem_with_help("type", what, help)));
+    }
+    let (analysis, method, stages) = (analysis?, method?, stages?);
+    let (mut loads, mut load_presence) = loads?;
+    let water = conditions::water(&root, dimension, bodies.as_deref().ok());
+    if let Some((load, presence)) = water? {
+        loads.push(load);
+        load_presence.push(presence);
+    }
     let ghost = ghost?.in_force(analysis.kind, method.mass);
     let mut deck = Deck {
         title: title?,
         dimension,
         directory: directory.to_path_buf(),
         analysis,
+        stages,
         method,
         ghost,
         materials: materials?,
         bodies: bodies?,
         boundaries: boundaries?,
-        loads: loads?,
+        loads,
+        load_presence,
         rigids: rigids?,
         contacts: contacts?,
         verify: verify?,

@@ -24,7 +24,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::run_state::RunState;
 use super::seal::{self, Checksum, Flaw, checksum_of, wrapping_sum};
-use crate::deck::physics::{difference, difference_from_format_1};
+use crate::deck::physics::{Physics, difference, difference_from_format_1};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::agreement::{all_agree, on_root};
@@ -97,7 +97,7 @@ impl<const D: usize> Checkpoint<'_, D> {
         let body: Vec<u64> = points.body.iter().map(|&body| u64::from(body)).collect();
         out.rows("points.body", 1, &body)?;
         for (name, words) in Points::<D>::field_words() {
-            if !points.affine && Points::<D>::of_affine(name) {
+            if !points.stores(name) {
                 continue;
             }
             let mut values = Vec::with_capacity(points.len() * words);
@@ -134,7 +134,7 @@ impl<const D: usize> Checkpoint<'_, D> {
 /// file, and says nothing about others. Collective, the same outcome on all ranks.
 pub fn read<const D: usize>(
     path: &Path,
-    physics: &str,
+    physics: &Physics,
     comm: &SimpleCommunicator,
 ) -> std::result::Result<Restored<D>, Refusal> {
     let format = match seal::test(path, FORMAT, comm) {
@@ -149,6 +149,7 @@ pub fn read<const D: usize>(
     let sums = sums.chunks_exact(2).map(|s| (s[0], s[1])).collect();
     let input = Reader { file, comm, sums };
     let own = input.text("text.physics").map_err(damaged)?;
+    let physics = physics.beside(&own);
     if own != physics {
         let found = match format {
             1 => difference_from_format_1(&own, physics),
@@ -323,11 +324,11 @@ impl Reader<'_> {
         let id = self.rows::<u64>("points.id", first, rows)?;
         let body = self.rows::<u64>("points.body", first, rows)?;
         let mut fields = Vec::new();
-        let mut affine = true;
+        let mut absent = Vec::new();
         for (field, words) in Points::<D>::field_words() {
             let mut name = dataset_of(field);
-            if Points::<D>::of_affine(field) && !self.file.has(&name) {
-                affine = false;
+            if Points::<D>::is_optional(field) && !self.file.has(&name) {
+                absent.push(field);
                 fields.push((words, vec![0.0; words * rows]));
                 continue;
             }
@@ -351,7 +352,12 @@ impl Reader<'_> {
             }
             fields.push((words, values));
         }
-        let mut points = Points { affine, ..Points::default() };
+        let has = |field: &str| !absent.contains(&field);
+        let mut points = Points {
+            affine: has("spread"),
+            counts_anew: has("displacement_start"),
+            ..Points::default()
+        };
         let mut record = Vec::with_capacity(Points::<D>::base_words());
         for p in 0..rows {
             record.clear();

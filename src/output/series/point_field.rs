@@ -84,6 +84,8 @@ point_field_table! {
     Velocity "velocity",
     Acceleration "acceleration",
     Stress "stress",
+    EffectiveStress "effective_stress",
+    PorePressure "pore_pressure",
     KirchhoffStress "kirchhoff_stress",
     PrincipalStress "principal_stress",
     Pressure "pressure",
@@ -179,12 +181,13 @@ impl PointField {
     /// come from [`PointField::integer`] instead and appear here rounded to `f64`.
     pub fn append<const D: usize>(self, points: &Points<D>, p: usize, out: &mut Vec<f64>) {
         let jacobian = || points.deformation_gradient[p].determinant();
-        let cauchy = || points.kirchhoff_stress[p] / jacobian();
+        let effective = || points.kirchhoff_stress[p] / jacobian();
+        let cauchy = || match points.water {
+            None => effective(),
+            Some(_) => effective() - Matrix3::identity() * points.pore_pressure(p),
+        };
         match self {
-            PointField::Displacement => {
-                let (x, start) = (&points.position[p], &points.position_initial[p]);
-                append_vector(&std::array::from_fn::<f64, D, _>(|a| x[a] - start[a]), out);
-            }
+            PointField::Displacement => append_vector(&points.displacement(p), out),
             PointField::Position => append_vector(&points.position[p], out),
             PointField::PositionInitial => append_vector(&points.position_initial[p], out),
             PointField::Velocity => append_vector(&points.velocity[p], out),
@@ -192,13 +195,16 @@ impl PointField {
             PointField::HalfLength => append_vector(&points.half_length[p], out),
             PointField::PointForce => append_vector(&points.point_force[p], out),
             PointField::Stress => append_symmetric(&cauchy(), out),
+            PointField::EffectiveStress => append_symmetric(&effective(), out),
+            PointField::PorePressure => out.push(points.pore_pressure(p)),
             PointField::KirchhoffStress => append_symmetric(&points.kirchhoff_stress[p], out),
             PointField::ElasticLeftCauchyGreen => {
                 append_symmetric(&(Matrix3::identity() + points.elastic_excess[p]), out);
             }
             PointField::PrincipalStress => out.extend(descending(&cauchy())),
-            PointField::Pressure | PointField::MeanStress => out.push(-cauchy().trace() / 3.0),
-            PointField::MobilisedFriction => out.push(mobilised_friction(&cauchy())),
+            PointField::Pressure => out.push(-cauchy().trace() / 3.0),
+            PointField::MeanStress => out.push(-effective().trace() / 3.0),
+            PointField::MobilisedFriction => out.push(mobilised_friction(&effective())),
             PointField::LogStrain => append_symmetric(&LogStrain::of(points, p).tensor(), out),
             PointField::VolumetricStrain => out.push(LogStrain::of(points, p).trace()),
             PointField::EquivalentStrain => out.push(LogStrain::of(points, p).equivalent()),

@@ -31,6 +31,8 @@ pub struct PointsSeries {
     lists: Vec<FrameList>,
     points: XdmfSeries,
     domains: Option<XdmfSeries>,
+    /// Number of the present stage, from one; `None` in a deck without stages.
+    pub stage: Option<u64>,
 }
 
 impl PointsSeries {
@@ -51,6 +53,7 @@ impl PointsSeries {
             lists: lists(formats).map(|kind| FrameList::new(directory, kind)).collect(),
             points: XdmfSeries::new(&directory.file("points.xdmf")),
             domains: has_domains.then(|| XdmfSeries::new(&directory.file("domains.xdmf"))),
+            stage: None,
         }
     }
 
@@ -102,6 +105,9 @@ impl PointsSeries {
         let file = FileWriter::create(&self.directory.file(&name), comm)?;
         file.write_number("step", &(step as u64))?;
         file.write_number("time", &time)?;
+        if let Some(stage) = self.stage {
+            file.write_number("stage", &stage)?;
+        }
 
         let mut columns = Vec::with_capacity(3 * points.len());
         for position in &points.position {

@@ -23,6 +23,12 @@ pub struct Layout {
     pub contacts: Vec<String>,
     /// A conditioning run.
     pub conditioning: bool,
+    /// The deck names stages.
+    pub staged: bool,
+    /// The deck damps.
+    pub damped: bool,
+    /// A strength reduction.
+    pub reduced: bool,
 }
 
 /// Name and unit of a column.
@@ -36,7 +42,12 @@ pub struct Column {
 #[derive(Debug, Clone, Default)]
 pub struct HistoryRow {
     pub step: usize,
+    /// From zero.
+    pub stage: usize,
+    /// s of the stage.
     pub load_factor: f64,
+    /// What the strength is divided by.
+    pub strength_factor: f64,
     /// s
     pub time: f64,
     /// s
@@ -52,6 +63,8 @@ pub struct HistoryRow {
     pub energy_ghost: f64,
     /// Work of loads and moved boundaries so far.
     pub work_external: f64,
+    /// What damping has taken so far.
+    pub dissipation_damping: f64,
     pub momentum: [f64; 3],
     /// About the origin.
     pub angular_momentum: [f64; 3],
@@ -143,7 +156,13 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
     let mut cells = Vec::new();
     let mut cell = |name: String, unit, value| cells.push((Column { name, unit }, value));
     cell("step".into(), "-", row.step as f64);
+    if layout.staged {
+        cell("stage".into(), "-", (row.stage + 1) as f64);
+    }
     cell("load_factor".into(), "-", row.load_factor);
+    if layout.reduced {
+        cell("strength_factor".into(), "-", row.strength_factor);
+    }
     cell("time".into(), "s", row.time);
     cell("dt".into(), "s", row.dt);
     cell("newton_iterations".into(), "-", row.newton_iterations as f64);
@@ -154,6 +173,9 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
     cell("energy_plastic".into(), energy, row.energy_plastic);
     cell("energy_ghost".into(), energy, row.energy_ghost);
     cell("work_external".into(), energy, row.work_external);
+    if layout.damped {
+        cell("dissipation_damping".into(), energy, row.dissipation_damping);
+    }
     for (axis, value) in axes.iter().zip(row.momentum) {
         cell(format!("momentum_{axis}"), momentum, value);
     }
@@ -295,6 +317,9 @@ mod tests {
             free: vec!["ball".into()],
             contacts: vec!["cone-a".into()],
             conditioning: true,
+            staged: true,
+            damped: true,
+            reduced: true,
         };
         let reaction = Reaction { force: [1.0, 2.0, 3.0], sum_abs: 4.0, torque: 5.0, held: 8.0 };
         let row = HistoryRow {
@@ -309,7 +334,7 @@ mod tests {
         };
         let cells = cells(&layout, &row);
         let value = |name: &str| cells.iter().find(|(c, _)| c.name == name).unwrap().1;
-        assert_eq!(value("step"), 12.0);
+        assert_eq!((value("step"), value("stage")), (12.0, 1.0));
         assert_eq!(value("momentum_y"), 6.0);
         assert_eq!(value("reaction.a.z"), 0.0);
         assert_eq!(value("reaction.b.z"), 3.0);

@@ -1,10 +1,9 @@
 //! What the state at the start shows of a deck: formulas without a value there, and conditions that
 //! act on nothing. Found before anything is solved or written.
 
-use crate::deck::Scope;
-use crate::deck::figure;
-use crate::deck::model::{AnalysisType, Deck, Load, Place, Symmetry};
+use crate::deck::model::{AnalysisType, Boundary, Deck, Load, Place, Symmetry};
 use crate::deck::schema::AXES;
+use crate::deck::{Presence, Scope, When, figure};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::loads::pressure::PressureAt;
@@ -39,9 +38,12 @@ pub fn check<const D: usize>(
 /// The first step; with a step that follows the stability limit only its begin is known.
 fn first_span(deck: &Deck) -> StepSpan {
     let span = implicit::first_span(deck);
-    match (deck.analysis.steps, deck.analysis.duration) {
-        (Some(_), Some(duration)) => StepSpan { time_end: span.factor_end * duration, ..span },
-        (None, _) => StepSpan { factor_end: 0.0, ..span },
+    let first = deck.stages.first();
+    match first.map(|stage| (stage.steps, stage.duration)) {
+        Some((Some(_), Some(duration))) => {
+            StepSpan { time_end: span.factor_end * duration, ..span }
+        }
+        Some((None, _)) => StepSpan { factor_end: 0.0, ..span },
         _ => span,
     }
 }
@@ -117,7 +119,9 @@ fn loads<const D: usize>(
                     ends.into_iter().find_map(|(s, t)| {
                         let mut found = PressureAt::<D>::default();
                         let (x, reach) = (&points.position[p], &points.half_length[p]);
-                        pressure.add_at(x, reach, Moment::new(kind, s, t), &mut found);
+                        let when = When { stage: 0, factor: s, time: t };
+                        let at = Moment::new(kind, Presence::default(), when);
+                        pressure.add_at(x, reach, (at, 1.0), &mut found);
                         (!found.is_finite()).then_some((found.value, s))
                     })
                 };
@@ -132,6 +136,7 @@ fn loads<const D: usize>(
                     )
                 })
             }
+            Load::Water(_) => None,
             Load::Manufactured(_) => {
                 let Some(field) = &model.manufactured else { continue };
                 let fault = |p: usize| {
@@ -171,12 +176,16 @@ fn boundaries<const D: usize>(
     let (deck, grid) = (&model.deck, &model.grid);
     let mut warnings = Vec::new();
     let mut contest = Contest::new(numbering.owned * D);
+    let at_start = |boundary: &Boundary| boundary.presence.holds_in(0);
     for (index, boundary) in deck.boundaries.iter().enumerate() {
         if let Place::Box { min, max } = &boundary.place
             && let Some(why) = without_nodes(grid, min, max)
         {
             let key = format!("boundary.{index}.where.box");
             return Err(Error::Input(deck.places.say(&key, &why)));
+        }
+        if !at_start(boundary) {
+            continue;
         }
         if let Place::CellsOf { body } = boundary.place
             && !world.any(
@@ -232,7 +241,8 @@ fn on_surface<const D: usize>(
 ) -> Option<String> {
     let kind = model.deck.analysis.kind;
     ends.into_iter().find_map(|(s, t)| {
-        let at = Moment::new(kind, s, t);
+        let when = When { stage: 0, factor: s, time: t };
+        let at = Moment::new(kind, Presence::default(), when);
         let (key, value, place) = match model.loads[index].on_surface()? {
             OnSurface::Traction { surface, value } => {
                 surface.elements().iter().find_map(|own| {
@@ -247,7 +257,7 @@ fn on_surface<const D: usize>(
             OnSurface::Pressure { surface, pressure } => {
                 surface.elements().iter().find_map(|own| {
                     let (place, mut found) = (own.element.place, PressureAt::<D>::default());
-                    pressure.add_at(&place, &[0.0; D], at, &mut found);
+                    pressure.add_at(&place, &[0.0; D], (at, 1.0), &mut found);
                     (!found.is_finite()).then_some(("pressure.value", found.value, place))
                 })?
             }
@@ -266,7 +276,8 @@ fn prescribed<const D: usize>(model: &Model<D>, index: usize, span: StepSpan) ->
     let kind = model.deck.analysis.kind;
     for support in model.supports.iter().filter(|support| support.boundary == index) {
         for (s, t) in [(span.factor_start, span.time_start), (span.factor_end, span.time_end)] {
-            let at = Moment::new(kind, s, t);
+            let when = When { stage: 0, factor: s, time: t };
+            let at = Moment::new(kind, Presence::default(), when);
             for own in support.surface.elements() {
                 let u = support.prescribed(&own.element, at);
                 if let Some(axis) = u.iter().position(|u| !u.is_finite()) {

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::basis;
 use crate::contact::start::corners_within;
+use crate::deck::Presence;
 use crate::deck::model::{Load, Symmetry};
 use crate::deck::schema::AXES;
 use crate::error::{Error, Result};
@@ -17,6 +18,7 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 use crate::system::numbering::Touched;
 use crate::system::populated::Populated;
+use crate::system::supports::Support;
 use crate::system::terms::contact::TOUCH;
 use crate::system::terms::surface;
 
@@ -45,6 +47,46 @@ pub fn require<const D: usize>(
             if model.contacts.is_empty() { "" } else { ", nor a rigid body that it touches" }
         ))),
     }
+}
+
+/// [`require`] of the later stages, with the bodies where they are at the start: what goes may be
+/// what others hang on. Collective.
+pub fn require_later<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+) -> Result<()> {
+    let deck = &model.deck;
+    for (stage, of_deck) in deck.stages.iter().enumerate().skip(1) {
+        let changes =
+            |presence: &Presence| presence.comes_in(stage) || presence.until == Some(stage);
+        let bodies = deck.bodies.iter().map(|body| &body.presence);
+        let boundaries = deck.boundaries.iter().map(|boundary| &boundary.presence);
+        if !bodies.chain(boundaries).any(changes) {
+            continue;
+        }
+        let mut there = points.clone();
+        there.append(&model.waiting);
+        let holds = |body: u32| deck.bodies[body as usize].presence.holds_in(stage);
+        let kept: Vec<usize> = (0..there.len()).filter(|&p| holds(there.body[p])).collect();
+        there.select(&kept);
+        let active = step_system::active(world, model, &there)?;
+        let span = StepSpan {
+            stage,
+            factor_start: 0.0,
+            factor_end: 1.0,
+            time_start: stage as f64,
+            time_end: stage as f64 + 1.0,
+        };
+        require(world, model, &there, &active, span).map_err(|error| match error {
+            Error::Input(text) => {
+                let name = &of_deck.name;
+                Error::Input(format!("in stage \"{name}\", without what has gone by then: {text}"))
+            }
+            other => other,
+        })?;
+    }
+    Ok(())
 }
 
 /// In dynamics: a warning of a body that falls, as nothing holds it where gravity pulls. Collective.
@@ -137,7 +179,8 @@ fn loose<const D: usize>(
             }
         }
     }
-    add_supports(model, points, numbering, &pieces, (middle, length), &mut grams)?;
+    let extent = (middle, length);
+    add_supports(model, points, (numbering, first.stage), &pieces, extent, &mut grams)?;
     for (piece, rows) in held_by_contact(model, points, numbering, &pieces, (&middle, length)) {
         let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
         for row in rows {
@@ -170,7 +213,7 @@ fn loose<const D: usize>(
 fn add_supports<const D: usize>(
     model: &Model<D>,
     points: &Points<D>,
-    numbering: &Numbering,
+    (numbering, stage): (&Numbering, usize),
     pieces: &[u64],
     (middle, length): ([f64; D], f64),
     grams: &mut BTreeMap<u64, Vec<f64>>,
@@ -185,7 +228,10 @@ fn add_supports<const D: usize>(
         let Some(piece) = nodes.iter().find_map(|&n| numbering.local(n).map(|n| pieces[n])) else {
             continue;
         };
-        for support in &model.supports {
+        let holds = |support: &&Support<D>| {
+            model.deck.boundaries[support.boundary].presence.holds_in(stage)
+        };
+        for support in model.supports.iter().filter(holds) {
             for own in support.surface.carried_by(points.id[p]) {
                 let place = own.element.place;
                 if support.within.as_ref().is_some_and(|sheet| !sheet.holds(&place)) {

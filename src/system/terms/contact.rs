@@ -16,6 +16,7 @@ use crate::contact::motion::When;
 use crate::contact::pose::Pose;
 use crate::contact::surface::length;
 use crate::contact::{Contacts, Near, Pair};
+use crate::deck::Presence;
 use crate::deck::model::Basis;
 use crate::grid::Grid;
 use crate::grid::bins::REACH;
@@ -86,6 +87,8 @@ impl<const D: usize> ContactTerm<D> {
         if contacts.is_empty() {
             return None;
         }
+        // Rigid bodies are there from the first stage on: s of it, then 1.
+        let span = span.seen_by(Presence::default());
         let start = When { load_factor: span.factor_start, time: span.time_start };
         let end = When { load_factor: span.factor_end, time: span.time_end };
         let mut term = ContactTerm {

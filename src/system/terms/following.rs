@@ -1,6 +1,7 @@
 //! External forces at the nodes that follow the motion within a step: pressures by virtual stress, and
 //! what acts on surfaces.
 
+use crate::deck::When;
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
@@ -27,12 +28,11 @@ impl<'a, const D: usize> Following<'a, D> {
         model: &'a Model<D>,
         mesh: &'a Discretisation<D>,
         points: &'a Points<D>,
-        load_factor: f64,
-        time: f64,
+        when: When,
     ) -> Option<Self> {
         let step = mesh.step_points(points, &model.materials);
-        let pressure = PressureTerm::new(model, load_factor, time);
-        let surface = SurfaceTerm::new(model, step, &mesh.carriers, load_factor, time);
+        let pressure = PressureTerm::new(model, when);
+        let surface = SurfaceTerm::new(model, step, &mesh.carriers, when);
         let any = pressure.is_some() || surface.is_some();
         any.then_some(Following { step, pressure, surface })
     }

@@ -11,8 +11,9 @@
 
 use std::ops::Range;
 
-use crate::loads::Moment;
+use crate::deck::When;
 use crate::loads::pressure::{Pressure, PressureAt};
+use crate::loads::{Moment, shares_of_bodies};
 use crate::system::model::Model;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{BlockMatrix, BlockRows};
@@ -24,16 +25,29 @@ use super::term::{At, Part};
 
 /// The pressures of a deck at one moment.
 pub struct PressureTerm<'a> {
-    pressures: Vec<&'a Pressure>,
+    pressures: Vec<Pressing<'a>>,
+}
+
+/// A pressure as it is at the moment.
+struct Pressing<'a> {
+    pressure: &'a Pressure,
     at: Moment,
+    /// What each body takes of it; `None`: all.
+    shares: Option<Vec<f64>>,
 }
 
 impl<'a> PressureTerm<'a> {
-    /// `None` where the deck has no pressure.
-    pub fn new<const D: usize>(model: &'a Model<D>, load_factor: f64, time: f64) -> Option<Self> {
-        let at = Moment::new(model.deck.analysis.kind, load_factor, time);
-        let pressures: Vec<_> = model.loads.iter().filter_map(|load| load.pressure()).collect();
-        (!pressures.is_empty()).then_some(PressureTerm { pressures, at })
+    /// `None` where no pressure acts.
+    pub fn new<const D: usize>(model: &'a Model<D>, when: When) -> Option<Self> {
+        let deck = &model.deck;
+        let loads = model.loads.iter().zip(&deck.load_presence);
+        let pressing = loads.filter_map(|(load, &presence)| {
+            let pressure = load.pressure().filter(|_| presence.is_in(when.stage))?;
+            let at = Moment::new(deck.analysis.kind, presence, when);
+            Some(Pressing { pressure, at, shares: shares_of_bodies(deck, presence, when) })
+        });
+        let pressures: Vec<_> = pressing.collect();
+        (!pressures.is_empty()).then_some(PressureTerm { pressures })
     }
 
     /// Adds this rank's shares of the force at an iterate, and the tangent of its negative where there
@@ -105,8 +119,9 @@ impl<'a> PressureTerm<'a> {
             }
         }
         let mut found = PressureAt::<D>::default();
-        for pressure in &self.pressures {
-            pressure.add_at(&x, &points.half_length[p], self.at, &mut found);
+        for Pressing { pressure, at, shares } in &self.pressures {
+            let body = shares.as_ref().map_or(1.0, |shares| shares[points.body[p] as usize]);
+            pressure.add_at(&x, &points.half_length[p], (*at, body), &mut found);
         }
         if found.is_zero() {
             return false;

@@ -15,11 +15,12 @@
 //! For `gimp`, whose stress is integrated over its domains exactly, what is spread over a surface goes to
 //! the nodes by the grid's own functions at the element instead, where the carrier reaches their nodes.
 
+use crate::deck::When;
 use crate::deck::expression::Expression;
 use crate::deck::model::Basis;
 use crate::grid::Grid;
 use crate::loads::pressure::{Pressure, PressureAt};
-use crate::loads::{Moment, OnSurface};
+use crate::loads::{Moment, OnSurface, shares_of_bodies};
 use crate::points::Points;
 use crate::surface::{Carried, Element, norm};
 use crate::system::model::Model;
@@ -39,7 +40,6 @@ pub struct SurfaceTerm<'a, const D: usize> {
     /// Those of groups that touch nodes of other ranks come first.
     reaching: usize,
     weights: Vec<f64>,
-    at: Moment,
 }
 
 /// One action on one element.
@@ -54,6 +54,7 @@ struct Act<'a, const D: usize> {
     area: [f64; D],
     element: &'a Element<D>,
     kind: Kind<'a, D>,
+    at: Moment,
 }
 
 #[derive(Clone, Copy)]
@@ -97,37 +98,50 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
         model: &'a Model<D>,
         step: StepPoints<'_, D>,
         carriers: &[usize],
-        load_factor: f64,
-        time: f64,
+        when: When,
     ) -> Option<Self> {
         if !model.acts_on_surfaces() {
             return None;
         }
-        let at = Moment::new(model.deck.analysis.kind, load_factor, time);
+        let deck = &model.deck;
         let points = step.points;
-        let mut term = SurfaceTerm { acts: Vec::new(), reaching: 0, weights: Vec::new(), at };
+        let mut term = SurfaceTerm { acts: Vec::new(), reaching: 0, weights: Vec::new() };
+        let loads = model.loads.iter().zip(&deck.load_presence).filter_map(|(load, &presence)| {
+            let load = load.on_surface().filter(|_| presence.is_in(when.stage))?;
+            let at = Moment::new(deck.analysis.kind, presence, when);
+            Some((load, at, shares_of_bodies(deck, presence, when)))
+        });
+        let loads: Vec<_> = loads.collect();
         for &p in carriers {
             let id = points.id[p];
-            for load in model.loads.iter().filter_map(|load| load.on_surface()) {
-                let (surface, kind) = match load {
+            for (load, at, shares) in &loads {
+                let mut at = *at;
+                let body = points.body[p] as usize;
+                at.share *= shares.as_ref().map_or(1.0, |shares| shares[body]);
+                let (surface, kind) = match *load {
                     OnSurface::Traction { surface, value } => (surface, Kind::Traction(value)),
                     OnSurface::Pressure { surface, pressure } => {
                         (surface, Kind::Pressure(pressure))
                     }
                 };
                 for own in surface.carried_by(id) {
-                    term.push(step, p, own, kind);
+                    term.push(step, p, own, (kind, at));
                     if model.deck.method.basis == Basis::Gimp && step.influences.hoop.is_empty() {
                         term.weigh_by_grid(&model.grid, step);
                     }
                 }
             }
             for support in &model.supports {
+                let presence = deck.boundaries[support.boundary].presence;
+                if !presence.holds_in(when.stage) {
+                    continue;
+                }
+                let at = Moment::new(deck.analysis.kind, presence, when);
                 let stiffness = support.penalty * model.stiffness[points.body[p] as usize];
                 for own in support.surface.carried_by(id) {
                     let place = place_of(points, p, own);
                     if support.within.as_ref().is_none_or(|sheet| sheet.holds(&place)) {
-                        term.push(step, p, own, Kind::Held(support, stiffness));
+                        term.push(step, p, own, (Kind::Held(support, stiffness), at));
                     }
                 }
             }
@@ -144,7 +158,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
         step: StepPoints<'_, D>,
         point: usize,
         own: &'a Carried<D>,
-        kind: Kind<'a, D>,
+        (kind, at): (Kind<'a, D>, Moment),
     ) {
         let points = step.points;
         let place = place_of(points, point, own);
@@ -178,6 +192,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
             area,
             element: &own.element,
             kind,
+            at,
         });
     }
 
@@ -304,13 +319,13 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
         let weights = self.weights_of(act, nodes);
         match act.kind {
             Kind::Traction(value) => {
-                let traction: [f64; D] = self.at.values(value, &self.scope(act, &act.place));
+                let traction: [f64; D] = act.at.values(value, &self.scope(act, &act.place));
                 let area = norm(&act.element.area);
                 traction.map(|t| t * area)
             }
             Kind::Held(support, stiffness) => {
                 // Apart from the place, in which small increments would lose their digits.
-                let target = support.target(act.element, self.at);
+                let target = support.target(act.element, act.at);
                 let start = std::array::from_fn(|i| act.place[i] - target[i]);
                 let gap = self.moved(start, act, nodes, displacement);
                 let scale = stiffness * norm(&act.element.area);
@@ -349,7 +364,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
             Kind::Pressure(pressure) => {
                 let x = self.moved(act.place, act, nodes, displacement);
                 let mut found = PressureAt::<D>::default();
-                pressure.add_at(&x, &[0.0; D], self.at, &mut found);
+                pressure.add_at(&x, &[0.0; D], (act.at, 1.0), &mut found);
                 let gradients = &step.influences.gradients[step.influences.row(act.point)];
                 let increment = displacement_gradient(gradients, |a| {
                     let first = nodes[a] as usize * D;
@@ -385,7 +400,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
     }
 
     fn scope(&self, act: &Act<'_, D>, place: &[f64; D]) -> crate::deck::Scope {
-        let mut scope = self.at.scope();
+        let mut scope = act.at.scope();
         scope.initial[..D].copy_from_slice(&act.element.place);
         scope.current[..D].copy_from_slice(place);
         scope

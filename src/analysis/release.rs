@@ -1,0 +1,100 @@
+//! What held the bodies and goes in a stage is released over it.
+//!
+//! In quasi-static steps: what is left out of balance where a step starts is what has gone, bodies
+//! and boundaries, as all else was in balance. With g = f_int - f_ext at the start, the forces
+//! g (1 - s') / (1 - s) act at the end: they fall from all of it to nothing over the stage, whatever
+//! the steps, and nothing needs to be remembered between steps.
+//!
+//! In dynamics the points of a body that goes act with the share 1 - s of their stress: s f_int of
+//! these points pushes against it.
+
+use crate::error::Result;
+use crate::parallel::World;
+use crate::points::Points;
+use crate::system::conditions::StepSpan;
+use crate::system::model::Model;
+use crate::system::scatter::BlockMatrix;
+use crate::system::step_system::Discretisation;
+use crate::system::terms::stress;
+
+/// Whether a quasi-static stage releases what held the bodies.
+pub(super) fn releases<const D: usize>(model: &Model<D>, stage: usize) -> bool {
+    let deck = &model.deck;
+    deck.analysis.kind.is_static()
+        && (deck.bodies.iter().any(|body| body.presence.fades_in(stage))
+            || deck.boundaries.iter().any(|boundary| boundary.presence.fades_in(stage)))
+}
+
+/// g of the owned degrees of freedom at the step's start, N, and its share at the end. `external`:
+/// f_ext at the start. Collective.
+pub(super) fn released<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    external: &[f64],
+    span: StepSpan,
+) -> Result<(Vec<f64>, f64)> {
+    let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+    let size = numbering.len() * D;
+    let (still, mut force) = (vec![0.0; size], vec![0.0; size]);
+    let step = mesh.step_points(points, &model.materials);
+    let frame = model.deck.method.frame;
+    let none = None::<&mut BlockMatrix<D>>;
+    stress::assemble(step, frame, numbering, pattern, &still, &mut force, none);
+    numbering.halo.reverse_add(world, &mut force, D)?;
+    force.truncate(numbering.owned * D);
+    for (force, external) in force.iter_mut().zip(external) {
+        *force -= external;
+    }
+    // Trials of a strength reduction begin where all is released.
+    let left = 1.0 - span.factor_start;
+    Ok((force, if left > 0.0 { (1.0 - span.factor_end) / left } else { 0.0 }))
+}
+
+/// In dynamics: the share at s of the internal force of points whose bodies go in this stage, this
+/// rank's part of it at the local nodes, N; empty where none goes.
+pub(super) fn counter_force<const D: usize>(
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    (stage, factor): (usize, f64),
+) -> Vec<f64> {
+    let fades: Vec<bool> =
+        model.deck.bodies.iter().map(|body| body.presence.fades_in(stage)).collect();
+    if !fades.contains(&true) {
+        return Vec::new();
+    }
+    let mut force = vec![0.0; mesh.numbering.len() * D];
+    let step = mesh.step_points(points, &model.materials);
+    for p in (0..points.len()).filter(|&p| fades[points.body[p] as usize]) {
+        let row = mesh.influences.row(p);
+        let (stress, volume) = (&points.kirchhoff_stress[p], factor * points.volume_initial[p]);
+        for (&node, gradient) in step.nodes_of(p).iter().zip(&mesh.influences.gradients[row]) {
+            for i in 0..D {
+                let pull: f64 = (0..D).map(|j| stress[(i, j)] * gradient[j]).sum();
+                force[node as usize * D + i] += volume * pull;
+            }
+        }
+        let row = mesh.influences.row(p);
+        if let Some(hoops) = mesh.influences.hoop.get(row) {
+            for (&node, hoop) in step.nodes_of(p).iter().zip(hoops) {
+                force[node as usize * D] += volume * stress[(2, 2)] * hoop;
+            }
+        }
+    }
+    force
+}
+
+/// Sums of all ranks at the owned degrees of freedom; nothing for nothing. Collective.
+pub(super) fn owned<const D: usize>(
+    world: &World,
+    mesh: &Discretisation<D>,
+    mut shares: Vec<f64>,
+) -> Result<Vec<f64>> {
+    if !shares.is_empty() {
+        mesh.numbering.halo.reverse_add(world, &mut shares, D)?;
+        shares.truncate(mesh.numbering.owned * D);
+    }
+    Ok(shares)
+}
