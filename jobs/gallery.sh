@@ -11,6 +11,7 @@ draw() { # template, field
 draw beam von_mises
 draw slope plastic_strain
 draw footing plastic_strain
+draw excavation "|displacement|"
 draw cone plastic_strain
 draw column-collapse plastic_strain
 draw collision von_mises

@@ -89,6 +89,7 @@ fn shortened(name: &str) -> &'static [&'static str] {
         "beam" => &["analysis.steps=4", "load.0.point.force=[0, -20e3]"],
         "slope" => &["analysis.steps=3"],
         "footing" => &["analysis.steps=2", "boundary.3.displacement={ y = -0.015 }"],
+        "excavation" => &["stage.1.steps=1", "stage.2.steps=1"],
         "cone" => &["analysis.steps=3", "rigid.0.motion.displacement=[0, -0.0015]"],
         "column-collapse" => &["analysis.duration=0.02"],
         "collision" => &["analysis.duration=0.1"],

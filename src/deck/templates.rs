@@ -19,6 +19,7 @@ pub const TEMPLATES: &[Template] = &[
     template("beam", include_str!("templates/beam.toml")),
     template("slope", include_str!("templates/slope.toml")),
     template("footing", include_str!("templates/footing.toml")),
+    template("excavation", include_str!("templates/excavation.toml")),
     template("cone", include_str!("templates/cone.toml")),
     template("column-collapse", include_str!("templates/column-collapse.toml")),
     template("triaxial", include_str!("templates/triaxial.toml")),
