@@ -3,8 +3,8 @@
 //! locate, map, number, {assemble, solve}*, update.
 
 use crate::contact::motion::When;
-use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
+use crate::deck::{Deck, Presence};
 use crate::error::Result;
 use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
@@ -231,7 +231,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             }
         }
         row.cuts = self.stepping.cuts;
-        let end = When { load_factor: span.factor_end, time: span.time_end };
+        // As their contacts see them: s of the first stage, then 1.
+        let end = span.seen_by(Presence::default()).end();
+        let end = When { load_factor: end.factor, time: end.time };
         let poses = run.model.contacts.poses(end);
         Ok(Solved { row, mesh, displacement, reaction, moved_grid, poses })
     }
