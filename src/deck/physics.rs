@@ -308,7 +308,7 @@ mod tests {
         assert_ne!(short.whole(), long.whole());
         assert_eq!(difference(short.whole(), long.beside(short.whole())), None);
         // What was in the stages that are done must stay.
-        let other = staged(&more.replace("from = \"b\"\n", ""), "");
+        let other = staged(&format!("{more}[[load]]\nbody_force = [2, 0]\n"), "");
         assert!(difference(short.whole(), other.beside(short.whole())).is_some());
         assert!(difference(long.whole(), short.beside(long.whole())).is_some());
     }
