@@ -633,3 +633,23 @@ fix = ["x"]
     }
     assert!(rigid.windows(2).all(|pair| pair[1] < pair[0]), "{rigid:?}");
 }
+
+/// Mean resistance of a cone over its second radius of a path in Tresca clay, G / c_u = 100, within 5 % of
+/// the band between 9.72 (Teh, Houlsby 1991) and 10.77 (Lu et al. 2004). Single steps scatter.
+#[test]
+fn a_cone_meets_its_resistance() {
+    let results = Run::of("cone").ranks(2).results();
+    let (radius, path, strength) = (0.0175, 0.036, 10e3);
+    let area = std::f64::consts::PI * radius * radius;
+    let depth: Vec<f64> =
+        results.history("load_factor").iter().map(|factor| factor * path / radius).collect();
+    let resistance: Vec<f64> =
+        results.history("reaction.cone.y").iter().map(|f| f.abs() / area / strength).collect();
+    let first = depth.iter().position(|d| *d > depth[depth.len() - 1] - 1.0).expect("a radius");
+    let (mut sum, last) = (0.0, depth.len() - 1);
+    for k in first..last {
+        sum += 0.5 * (resistance[k] + resistance[k + 1]) * (depth[k + 1] - depth[k]);
+    }
+    let mean = sum / (depth[last] - depth[first]);
+    assert!((0.95 * 9.72..1.05 * 10.77).contains(&mean), "{mean}");
+}

@@ -55,7 +55,7 @@ fn decks_that_cannot_be_read() {
         "error: --set analysis.stepz=3: analysis.stepz: unknown key \"stepz\"
    = did you mean \"steps\"?
    = known keys of [analysis]: type, symmetry, steps, duration, cfl, tolerance, max_iterations, on_failure, \
-smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha",
+smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha, strength_tolerance, damping",
     );
     refused(
         &block().set("analysis.steps=\"many\""),

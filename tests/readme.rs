@@ -291,7 +291,9 @@ fn decks_named_in_the_pages_take_the_printed_settings() {
                 continue;
             };
             let Some(deck) = words.get(at + 1).filter(|deck| {
-                deck.starts_with("inputs/") && deck.ends_with(".toml") && !deck.contains("DECK")
+                deck.starts_with("inputs/")
+                    && deck.ends_with(".toml")
+                    && !deck.contains(char::is_uppercase)
             }) else {
                 continue;
             };

@@ -96,7 +96,9 @@ fn states(trial: [f64; 3]) -> Vec<Matrix3<f64>> {
 
 fn main() {
     println!("{}\n", machine());
-    println!("| model | region | law, ns | over plastic von-mises | stress + tangent, ns | over plastic von-mises |");
+    println!(
+        "| model | region | law, ns | over plastic von-mises | stress + tangent, ns | over plastic von-mises |"
+    );
     println!("|---|---|---|---|---|---|");
     let mut reference = [1.0; 2];
     let unit = Matrix3::identity();
