@@ -2,7 +2,7 @@
 //!
 //! | file | idea |
 //! |---|---|
-//! | `model.rs` | the checked deck as typed data |
+//! | `model/` | the checked deck as typed data |
 //! | `stage.rs` | stages, and what is there in which of them |
 //! | `words.rs`, `fields.rs` | the deck's words for enumerations and point fields |
 //! | `schema/` | every key once: type, unit, default, range, meaning |

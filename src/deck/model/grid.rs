@@ -1,0 +1,66 @@
+//! `[grid]`.
+
+use std::path::PathBuf;
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Grid {
+    Lattice(LatticeGrid),
+    Mesh(MeshGrid),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct LatticeGrid {
+    /// m
+    pub origin: Vec<f64>,
+    /// m, one per axis
+    pub spacing: Vec<f64>,
+    /// cells per axis
+    pub cells: Vec<usize>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct MeshGrid {
+    pub source: MeshSource,
+    pub motion: MeshMotion,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum MeshSource {
+    /// Gmsh file, absolute or relative to the deck's folder (already joined).
+    File(PathBuf),
+    /// Circular (inner = [r, r]) or elliptic hole in a disc of radius `outer`, m.
+    /// `grading` >= 1 refines around the ends of the long axis (1: uniform).
+    Annulus {
+        inner: [f64; 2],
+        outer: f64,
+        radial: usize,
+        around: usize,
+        element: Element,
+        grading: f64,
+    },
+    Box {
+        min: Vec<f64>,
+        max: Vec<f64>,
+        cells: Vec<usize>,
+        element: Element,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Element {
+    Tri3,
+    Quad4,
+    Tet4,
+    Hex8,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum MeshMotion {
+    Fixed,
+    /// Rigid rotation with the named boundary tag's prescribed rotation.
+    RotateWith(String),
+    /// Nodes follow the computed displacement along these axes (0, 1, 2) only.
+    Follow(Vec<usize>),
+    /// Nodes follow the material wholly: updated-Lagrangian FEM with `gauss` seeding.
+    Material,
+}

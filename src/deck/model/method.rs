@@ -1,0 +1,141 @@
+//! `[method]` and `[ghost]`.
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Method {
+    pub basis: Basis,
+    pub domain_update: DomainUpdate,
+    pub gimp_edge: GimpEdge,
+    pub point_volume: PointVolume,
+    pub locking: Locking,
+    pub frame: Frame,
+    pub mass: Mass,
+    pub stress_update: StressUpdate,
+    pub position_update: PositionUpdate,
+    /// FLIP share: 1 is FLIP, 0 is PIC.
+    pub flip: f64,
+    /// `velocity_update = "xpic"` with `xpic_order = m`; `None` otherwise.
+    pub xpic: Option<usize>,
+    /// `velocity_update = "apic"` or `"tpic"`; `None` otherwise.
+    pub affine: Option<AffineTransfer>,
+    /// A node whose summed basis weight is below this fraction of the largest one is held at
+    /// zero and left out of the residual (default 1e-8 without Ghost stiffness, 0 with it).
+    pub drop_below: f64,
+}
+
+/// Which of the two a point keeps while it moves: see [`crate::transfer::affine`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AffineTransfer {
+    /// Its affine moment: the angular momentum.
+    Apic,
+    /// Its velocity gradient: a rigid rotation.
+    Tpic,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Basis {
+    Mpm,
+    Gimp,
+    Cpdi1,
+    Cpdi2,
+}
+
+/// How a GIMP domain follows the deformation (Lagrangian §6.4).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DomainUpdate {
+    None,
+    Det,
+    Normal,
+    Stretch,
+    Corners,
+    NormalCorrected,
+    NormalIncremental,
+}
+
+/// What stresses are integrated over: the two differ where a domain's size does not follow det F.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum PointVolume {
+    /// det F V0
+    #[default]
+    Deformation,
+    /// That of the GIMP domain, as in the program behind Lagrangian §7.
+    Domain,
+}
+
+/// What keeps points from locking where the volume can hardly change.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Locking {
+    #[default]
+    None,
+    /// Stress from dF_bar = (det dF_0 / det dF)^(1/n) dF, dF_0 that of the cells.
+    FBar,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Frame {
+    Previous,
+    Updated,
+    Total,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Mass {
+    Consistent,
+    Lumped,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StressUpdate {
+    Usf,
+    Usl,
+    Musl,
+}
+
+/// Functions of a GIMP domain that sticks out of the grid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GimpEdge {
+    /// Those of the outer cell go on: their sum stays one.
+    Continued,
+    /// Hats of the grid's own nodes alone: what a node beyond the edge would hold is lost.
+    Published,
+}
+
+/// What moves the points of an explicit step with a Ghost mass.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PositionUpdate {
+    /// The velocity that keeps the angular momentum.
+    Momentum,
+    /// The updated nodal velocity (Ghost eq. 9).
+    Published,
+}
+
+/// Ghost stabilisation parameters. Absolute values win over factors.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ghost {
+    /// gamma_K, Pa.
+    pub stiffness: Option<f64>,
+    /// gamma_K as a multiple of each body's Young's modulus.
+    pub stiffness_factor: Option<f64>,
+    /// gamma_M, kg/m3.
+    pub mass: Option<f64>,
+    /// gamma_M as a multiple of each body's density.
+    pub mass_factor: Option<f64>,
+    pub scaling: GhostScaling,
+}
+
+impl Ghost {
+    /// gamma_K over Young's modulus where the deck says nothing: docs/evidence/ghost-factors.md.
+    pub const STIFFNESS_FACTOR: f64 = 0.01;
+    /// gamma_M over the density where the deck says nothing (Ghost §5.1).
+    pub const MASS_FACTOR: f64 = 0.25;
+    /// The same in implicit dynamics, where each step takes half of dv (M~ - M) dv from the energy:
+    /// 0.25 would cost a bar of sixteen cells a third of it in four periods.
+    pub const IMPLICIT_MASS_FACTOR: f64 = 0.01;
+}
+
+/// Scale of the face matrix: numerics of the default and of the papers' tables differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum GhostScaling {
+    ScaleFree,
+    Literal,
+    Published,
+}
