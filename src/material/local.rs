@@ -30,6 +30,14 @@ impl<'a> LocalMaterial<'a> {
         LocalMaterial { material, parameters: &[] }
     }
 
+    /// Whether both are one body's material without parameters of their own.
+    #[inline(always)]
+    pub fn shares_parameters(&self, other: &LocalMaterial<'_>) -> bool {
+        std::ptr::eq(self.material, other.material)
+            && self.parameters.is_empty()
+            && other.parameters.is_empty()
+    }
+
     /// See [`Model::respond`].
     #[inline(always)]
     pub fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {

@@ -102,6 +102,25 @@ macro_rules! models {
                 match self { $( Material::$model(model) => Model::energy(model, elastic_strain), )* }
             }
 
+            /// [`Model::respond`] and [`Model::energy`] of the first `count` points: `take` gets
+            /// what the trial strains and the state of each come to. One dispatch for all.
+            #[inline(always)]
+            pub(crate) fn respond_each<'a>(
+                &self,
+                count: usize,
+                trial: impl Fn(usize) -> [f64; 3],
+                state: impl Fn(usize) -> &'a [f64],
+                mut take: impl FnMut(usize, Response, f64),
+            ) {
+                match self { $( Material::$model(model) => {
+                    for k in 0..count {
+                        let response = model.respond(trial(k), state(k));
+                        let energy = Model::energy(model, response.elastic_strain);
+                        take(k, response, energy);
+                    }
+                } )* }
+            }
+
             /// See [`Model::elastic_strain`].
             pub fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
                 match self { $( Material::$model(model) => model.elastic_strain(stress), )* }

@@ -100,15 +100,32 @@ pub(crate) fn states<'a, const D: usize>(
     for (strain, trial) in values.iter_mut().zip(&*trials) {
         *strain = trial.values.map(ln_1p);
     }
-    for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {
-        let StepStart { material, state: before, .. } = start(k);
-        let response = material.respond(values[k].map(|e| 0.5 * e), before);
+    let strains = values;
+    let mut take = |k: usize, response: Response, energy: f64| {
         stresses[k] = response.stress;
-        values[k] = elastic_values(trial, &response);
+        values[k] = elastic_values(&trials[k], &response);
+        let state = &mut out[k];
         state.plastic_increment = response.plastic_increment;
         state.dissipation = response.dissipation;
-        state.stored_energy = material.energy(response.elastic_strain);
+        state.stored_energy = energy;
         state.state = response.state;
+    };
+    let strain = |k: usize| strains[k].map(|e| 0.5 * e);
+    let alike = |material: LocalMaterial| {
+        (0..increments.len()).all(|k| start(k).material.shares_parameters(&material))
+    };
+    match increments.first().map(|_| start(0).material) {
+        // The model is chosen once for all of them.
+        Some(first) if alike(first) => {
+            first.material.respond_each(increments.len(), strain, |k| start(k).state, take);
+        }
+        _ => {
+            for k in 0..increments.len() {
+                let StepStart { material, state: before, .. } = start(k);
+                let response = material.respond(strain(k), before);
+                take(k, response, material.energy(response.elastic_strain));
+            }
+        }
     }
     for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {
         state.kirchhoff_stress = trial.compose(stresses[k]);
