@@ -7,6 +7,7 @@ mod program;
 use std::path::Path;
 
 use common::on_ranks;
+use common::product::product;
 use common::run::{Results, Run, relative_difference};
 use mpi::environment::Universe;
 use mpi::traits::*;
@@ -544,19 +545,7 @@ fn tangent<const D: usize>(world: &World, basis: &str, shape: &str, friction: &s
         let mut matrix = BlockMatrix::<D>::zeros(pattern);
         let now = force(&at(0.0), Some(&mut matrix));
         *touched = now.iter().fold(0.0f64, |m, f| m.max(f.abs()));
-        let mut along = vec![0.0; count];
-        for node in 0..mesh.numbering.len() {
-            let row = pattern.row_of[node] as usize;
-            let range = pattern.offsets[row]..pattern.offsets[row + 1];
-            for i in 0..D {
-                for (position, &column) in pattern.columns[range.clone()].iter().enumerate() {
-                    for k in 0..D {
-                        let entry = D * D * range.start + (i * range.len() + position) * D + k;
-                        along[node * D + i] += matrix.values[entry] * v[column as usize * D + k];
-                    }
-                }
-            }
-        }
+        let along = product(pattern, &matrix, &v);
         let (more, less) = (force(&at(1e-7), None), force(&at(-1e-7), None));
         let size = along.iter().fold(0.0f64, |m, k| m.max(k.abs()));
         for dof in 0..count {

@@ -6,6 +6,7 @@ mod common;
 use std::path::Path;
 
 use common::on_ranks;
+use common::product::product;
 use common::run::{Run, relative_difference};
 use mpi::environment::Universe;
 use mpi::traits::*;
@@ -247,23 +248,7 @@ fn tangent<const D: usize>(world: &World, basis: &str, pressure: &str) {
         force
     };
     force(&at(0.0), Some(&mut matrix));
-    let product = |x: &[f64]| -> Vec<f64> {
-        let mut out = vec![0.0; count];
-        for node in 0..mesh.numbering.len() {
-            let row = pattern.row_of[node] as usize;
-            let range = pattern.offsets[row]..pattern.offsets[row + 1];
-            for i in 0..D {
-                for (position, &column) in pattern.columns[range.clone()].iter().enumerate() {
-                    for k in 0..D {
-                        let entry = D * D * range.start + (i * range.len() + position) * D + k;
-                        out[node * D + i] += matrix.values[entry] * x[column as usize * D + k];
-                    }
-                }
-            }
-        }
-        out
-    };
-    let (along, across) = (product(&v), product(&w));
+    let (along, across) = (product(pattern, &matrix, &v), product(pattern, &matrix, &w));
     let (more, less) = (force(&at(1e-6), None), force(&at(-1e-6), None));
     let size = along.iter().fold(0.0f64, |m, k| m.max(k.abs()));
     for dof in 0..count {

@@ -2,6 +2,7 @@
 #![allow(dead_code)]
 
 pub mod left;
+pub mod product;
 pub mod run;
 pub mod validation;
 
