@@ -20,7 +20,7 @@ pub(super) struct Loads<const D: usize> {
     pub nodes_start: Vec<f64>,
     /// Of the owned degrees of freedom, here and below, with those that follow the motion.
     pub external_start: Vec<f64>,
-    /// Those at the end are known once the step is solved.
+    /// The forces that follow the motion are added once the step is solved.
     pub external_end: Vec<f64>,
 }
 

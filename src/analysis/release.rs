@@ -16,6 +16,7 @@ use crate::system::model::Model;
 use crate::system::scatter::BlockMatrix;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::stress;
+use crate::transfer::mapping::{self, Deformation};
 
 /// Whether a quasi-static stage releases what held the bodies.
 pub(super) fn releases<const D: usize>(model: &Model<D>, stage: usize) -> bool {
@@ -65,25 +66,13 @@ pub(super) fn counter_force<const D: usize>(
     if !fades.contains(&true) {
         return Vec::new();
     }
-    let mut force = vec![0.0; mesh.numbering.len() * D];
-    let step = mesh.step_points(points, &model.materials);
+    let mut forces = vec![[0.0; D]; mesh.numbering.len()];
+    let (step, still) = (mesh.step_points(points, &model.materials), Deformation::default());
     for p in (0..points.len()).filter(|&p| fades[points.body[p] as usize]) {
-        let row = mesh.influences.row(p);
-        let (stress, volume) = (&points.kirchhoff_stress[p], factor * points.volume_initial[p]);
-        for (&node, gradient) in step.nodes_of(p).iter().zip(&mesh.influences.gradients[row]) {
-            for i in 0..D {
-                let pull: f64 = (0..D).map(|j| stress[(i, j)] * gradient[j]).sum();
-                force[node as usize * D + i] += volume * pull;
-            }
-        }
-        let row = mesh.influences.row(p);
-        if let Some(hoops) = mesh.influences.hoop.get(row) {
-            for (&node, hoop) in step.nodes_of(p).iter().zip(hoops) {
-                force[node as usize * D] += volume * stress[(2, 2)] * hoop;
-            }
-        }
+        mapping::add_force(step, p..p + 1, &[], &still, &mut forces);
     }
-    force
+    // `add_force` adds what the stress exerts on the nodes, -f_int.
+    forces.into_flattened().into_iter().map(|force| -factor * force).collect()
 }
 
 /// Sums of all ranks at the owned degrees of freedom; nothing for nothing. Collective.

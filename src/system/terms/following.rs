@@ -15,7 +15,7 @@ use super::stress::StepPoints;
 use super::surface::SurfaceTerm;
 use super::term::{At, Part};
 
-/// Those of a deck at one moment of a step.
+/// What a deck has of these forces, at one moment of a step.
 pub struct Following<'a, const D: usize> {
     step: StepPoints<'a, D>,
     pressure: Option<PressureTerm<'a>>,
