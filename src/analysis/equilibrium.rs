@@ -213,7 +213,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self
     }
 
-    /// Those of the last evaluation, owned nodes; empty without any.
+    /// Forces of the last evaluation that follow the motion, N, owned nodes; empty without any.
     pub fn following_force(&self) -> &[f64] {
         self.following.as_ref().map_or(&[], |followed| &followed.force)
     }

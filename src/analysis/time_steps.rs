@@ -148,7 +148,7 @@ pub fn stability_limit<const D: usize>(
 }
 
 /// Square of the highest frequency, 1/s2, that the penalties on surfaces give the mass of a point that
-/// carries their elements: Σ β A Σ_a w_a^2 / (m S_a), of which the sum over nodes is about one where w is
+/// carries their elements: Σ β A Σ_a w_a^2 / (m S_a). The sum over the nodes a is about one where w equals
 /// S, and larger where the surface lies beyond the point.
 fn held_frequency<const D: usize>(model: &Model<D>, points: &Points<D>, p: usize) -> f64 {
     /// An estimate for surfaces half a spacing beyond their points; a column on a support ran at cfl = 0.9.

@@ -58,7 +58,7 @@ pub struct Influences<const D: usize> {
     pub centre_gradients: Vec<[f64; D]>,
     /// With axisymmetry the hoop row of the same entries ([`radial`]), 1/m: dF_zz - 1 = Σ H u_r.
     pub hoop: Vec<f64>,
-    /// That of F-bar, 1/m.
+    /// The hoop row that F-bar takes in its place, 1/m; empty without F-bar or axisymmetry.
     pub centre_hoop: Vec<f64>,
     /// Where the nodes come from, of bases that collect them place by place.
     pub cells: Cells,

@@ -107,7 +107,7 @@ impl Shape {
             }
             Form::Polygon { vertices } => out.extend(vertices.iter().map(|v| padded(v))),
             Form::Solid(solid) => {
-                // Those of its box: each corner of a fine surface would be too many.
+                // The corners of its box stand for them: a fine surface has too many.
                 let (low, high) = solid.bounds();
                 out.extend([low, high]);
             }

@@ -41,7 +41,7 @@ impl Product<'_> {
     }
 }
 
-/// `C` columns, of which some values are held at zero: their rows are those of the identity.
+/// The mass matrix for `C` columns. Some values are held at zero: their rows are those of the identity.
 pub struct System<'a, const C: usize> {
     product: Product<'a>,
     /// `None`: PETSc's preconditioner is used.

@@ -666,7 +666,7 @@ impl Recorder {
         stages.map(of_stage).filter(|_| self.staged).collect()
     }
 
-    /// A stage begins, from zero: what is recorded from now on is its.
+    /// Rows and frames from now on belong to this stage; stages are counted from zero.
     pub fn enter_stage(&mut self, stage: usize) {
         self.stage = stage;
         self.points.stage = self.staged.then_some(stage as u64 + 1);

@@ -93,7 +93,7 @@ pub enum StressUpdate {
 /// Functions of a GIMP domain that sticks out of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GimpEdge {
-    /// Those of the outer cell go on: their sum stays one.
+    /// The functions of the outer cell go on beyond the edge, and their sum stays one.
     Continued,
     /// Hats of the grid's own nodes alone: what a node beyond the edge would hold is lost.
     Published,

@@ -73,8 +73,8 @@ impl Boxes {
         self.nodes.first().map_or(([0.0; 3], [0.0; 3]), |node| (node.min, node.max))
     }
 
-    /// Calls `distance`, which gives the square of the distance from `x`, with triangles of which one
-    /// is the nearest.
+    /// Calls `distance`, which gives the square of the distance from `x`, with several triangles; the
+    /// nearest one is among them.
     pub fn nearest(&self, x: &Place, mut distance: impl FnMut(usize) -> f64) {
         let mut best = f64::INFINITY;
         let mut stack = vec![0usize];

@@ -3,8 +3,8 @@
 use super::boxes::Boxes;
 use super::{Place, cross, dot, minus};
 
-/// An edge counts as going through only if it does so by more than this share of its length, and of the
-/// other facet's sides: facets that touch are fine.
+/// An edge goes through a facet if it reaches beyond it by more than this share of its own length and of
+/// the facet's sides. Facets that only touch are fine.
 const CLEARLY: f64 = 1e-9;
 
 /// In words the first two facets that cut each other, if any do.

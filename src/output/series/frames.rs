@@ -3,8 +3,8 @@
 //!
 //! Of large models every k-th row is read, and of many frames every k-th and the last. Rows lie in the
 //! order of ranks and cells, so that a sample is spread over the body; k is a prime number, as points lie
-//! in their cells in groups of 4, 8, 9 or 27, of which any other k could take one and the same. Nothing is
-//! held but the sample.
+//! in their cells in groups of 4, 8, 9 or 27, and another k could pick one place in every group. Memory
+//! holds nothing but the sample.
 
 use std::path::{Path, PathBuf};
 

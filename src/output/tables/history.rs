@@ -18,7 +18,7 @@ pub struct Layout {
     pub boundaries: Vec<String>,
     /// Names of the deck's rigid bodies and contacts, in deck order.
     pub rigids: Vec<String>,
-    /// Those of the rigid bodies that move freely.
+    /// Names of the rigid bodies that move freely, in deck order.
     pub free: Vec<String>,
     pub contacts: Vec<String>,
     /// A conditioning run.

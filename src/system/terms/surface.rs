@@ -37,7 +37,7 @@ use super::term::{At, Part};
 /// Everything that acts on surfaces at one moment, as this rank's points carry it.
 pub struct SurfaceTerm<'a, const D: usize> {
     acts: Vec<Act<'a, D>>,
-    /// Those of groups that touch nodes of other ranks come first.
+    /// How many acts come first because their groups touch nodes of other ranks.
     reaching: usize,
     weights: Vec<f64>,
 }
