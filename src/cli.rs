@@ -59,7 +59,7 @@ const USAGE: &str = "mpirun -n N mpm-par INPUT.toml [--set KEY=VALUE]... [--out 
     override_usage = USAGE,
     after_help = "Words with one dash, and their values, go to PETSc: -qs_ for equilibrium, -mass_ for mass solves.\nTools: mpm-par report DIR, mpm-par plot DIR --field F -o FILE, mpm-par completions SHELL, mpm-par man; each has --help.\nExit codes: 0 done, 1 the run failed, 2 bad input, 3 restart or file problem, 4 environment."
 )]
-struct Words {
+struct CommandLine {
     /// The deck; - reads it from standard input
     #[arg(value_name = "INPUT.toml", required_unless_present_any = ["list", "explain", "schema", "new"])]
     input: Option<PathBuf>,
@@ -217,14 +217,14 @@ pub fn tool(words: &[OsString]) -> Result<std::result::Result<Tool, String>> {
 /// The whole command line with its tools, for completions and the manual page.
 pub fn whole_command() -> clap::Command {
     let tools = Tools::command();
-    Words::command().subcommands(tools.get_subcommands().cloned())
+    CommandLine::command().subcommands(tools.get_subcommands().cloned())
 }
 
 /// Reads the command line; the first word is the program's name. Error: bad usage, with the
 /// usage text.
 pub fn parse(args: impl IntoIterator<Item = OsString>) -> Result<Arguments> {
     let (ours, petsc) = divide(args)?;
-    let words = match Words::try_parse_from(ours) {
+    let words = match CommandLine::try_parse_from(ours) {
         Ok(words) => words,
         Err(e) if matches!(e.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion) => {
             return Ok(Arguments { print: Some(e.to_string()), ..Arguments::default() });

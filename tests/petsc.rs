@@ -353,7 +353,7 @@ impl NewtonProblem for Chain<'_> {
         Ok(if error < ENOUGH { Verdict::Converged } else { Verdict::Continue })
     }
 
-    fn excess(&self) -> f64 {
+    fn error_over_tolerance(&self) -> f64 {
         self.errors.last().unwrap() / ENOUGH
     }
 }

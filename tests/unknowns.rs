@@ -15,7 +15,7 @@ use mpm_par::parallel::World;
 use mpm_par::petsc::{Ksp, Session};
 use mpm_par::run::setup;
 use mpm_par::system::held::Held;
-use mpm_par::system::in_place::{InPlace, Layout};
+use mpm_par::system::in_place::{InPlace, RowAddresses};
 use mpm_par::system::scatter::{BlockMatrix, BlockRows, add_support};
 use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::ghost::ghost_matrix;
@@ -101,15 +101,15 @@ fn solve<const N: usize>(
     let on_edge = |x: &[f64; 2]| x[0] <= 0.0 || x[0] >= 4.0 || x[1] <= 0.0 || x[1] >= 2.0;
     let fixed: Vec<bool> = places.iter().flat_map(|x| [on_edge(x); N]).collect();
 
-    let layout = Layout::<N>::new(numbering, pattern);
+    let addresses = RowAddresses::<N>::new(numbering, pattern);
     let mut held =
-        Held::new::<N>(numbering, pattern, fixed.clone(), &fixed, |row| layout.start(row));
+        Held::new::<N>(numbering, pattern, fixed.clone(), &fixed, |row| addresses.start(row));
     let mut matrix = solver::block_matrix::<N>(world, numbering, pattern).expect("a matrix");
-    let mut beside = vec![0.0; layout.len_beside()];
+    let mut beside = vec![0.0; addresses.len_beside()];
     let scale = 2.0;
     {
         let (mut main, mut other) = matrix.storage().expect("the solver's values");
-        let mut rows = InPlace::new(&layout, &mut main, &mut beside, None).expect("rows");
+        let mut rows = InPlace::new(&addresses, &mut main, &mut beside, None).expect("rows");
         for row in 0..numbering.owned {
             rows.touch(pattern, row);
             let entries = pattern.offsets[row]..pattern.offsets[row + 1];

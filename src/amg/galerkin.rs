@@ -6,14 +6,14 @@ use crate::petsc::Index;
 use crate::tensor::fused::{self, Block, add_product, add_transposed_product};
 
 use super::aggregate::Aggregates;
-use super::level::{self, BlockRows, Nodes, Rows};
+use super::level::{self, BlockCsr, Nodes, Rows};
 use super::owners::Owners;
 use super::prolongator::Prolongator;
 
 /// The next level.
 pub struct Coarse<const C: usize> {
     pub nodes: Nodes,
-    pub rows: BlockRows<C>,
+    pub rows: BlockCsr<C>,
 }
 
 /// Coarse nodes seen by the fine ones of this rank: owned ones first, then ghosts, ascending.
@@ -111,7 +111,7 @@ pub fn coarse_operator<const K: usize, const C: usize>(
             *sum += value;
         }
     }
-    let mut coarse = BlockRows { offsets: vec![0], columns: Vec::new(), values: Vec::new() };
+    let mut coarse = BlockCsr { offsets: vec![0], columns: Vec::new(), values: Vec::new() };
     for entries in &sums.rows {
         coarse.columns.extend(entries.iter().map(|&(column, _)| column));
         coarse.values.extend(entries.iter().map(|&(_, place)| sums.blocks[place as usize]));

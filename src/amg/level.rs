@@ -51,13 +51,13 @@ pub trait Rows<const K: usize> {
 
 /// Rows with values of their own.
 #[derive(Debug, Default)]
-pub struct BlockRows<const K: usize> {
+pub struct BlockCsr<const K: usize> {
     pub offsets: Vec<usize>,
     pub columns: Vec<u32>,
     pub values: Vec<Block<K, K>>,
 }
 
-impl<const K: usize> Rows<K> for BlockRows<K> {
+impl<const K: usize> Rows<K> for BlockCsr<K> {
     #[inline(always)]
     fn columns(&self, row: usize) -> &[u32] {
         &self.columns[self.offsets[row]..self.offsets[row + 1]]

@@ -8,7 +8,7 @@ use crate::parallel::{HaloPlan, World, exchange};
 use crate::petsc::Index;
 use crate::tensor::fused::Block;
 
-use super::level::{BlockRows, Rows};
+use super::level::{BlockCsr, Rows};
 
 /// The symmetric part of the `owned` rows: `global` numbers of the local nodes, `halo` of those
 /// beyond the owned ones. The pattern is symmetric, and own columns ascend within a row. Collective.
@@ -19,8 +19,8 @@ pub fn symmetric_part<const K: usize>(
     global: &[Index],
     halo: &HaloPlan,
     rows: &impl Rows<K>,
-) -> Result<BlockRows<K>> {
-    let mut sums = BlockRows { offsets: vec![0], ..BlockRows::default() };
+) -> Result<BlockCsr<K>> {
+    let mut sums = BlockCsr { offsets: vec![0], ..BlockCsr::default() };
     for row in 0..owned {
         sums.columns.extend_from_slice(rows.columns(row));
         sums.offsets.push(sums.columns.len());

@@ -46,7 +46,7 @@ pub fn run<const D: usize>(run: &mut Run<D>) -> Result<Ending> {
                 *x += total / steps as f64;
             }
         }
-        run.settle()?;
+        run.migrate_and_balance()?;
         let Run { world, model, points, recorder, clock } = &mut *run;
         let span = StepSpan {
             stage: 0,

@@ -19,7 +19,7 @@ use crate::petsc::{BlockProduct, Hierarchy};
 use crate::points::Points;
 use crate::system::conditions::Conditions;
 use crate::system::held::Held;
-use crate::system::in_place::{InPlace, Layout};
+use crate::system::in_place::{InPlace, RowAddresses};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
@@ -73,7 +73,7 @@ pub struct Equilibrium<'a, const D: usize> {
     following: Option<Followed<'a, D>>,
     /// What is summed, in this order.
     terms: Vec<Box<dyn Term<D> + 'a>>,
-    layout: Layout<D>,
+    addresses: RowAddresses<D>,
     /// Rows that the solver's array cannot take whole.
     beside: Vec<f64>,
     /// What the matrix holds.
@@ -161,9 +161,9 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             held[local * D..(local + 1) * D].fill(true);
         }
         let owned = numbering.owned * D;
-        let layout = Layout::<D>::new(numbering, pattern);
+        let addresses = RowAddresses::<D>::new(numbering, pattern);
         let held =
-            Held::new::<D>(numbering, pattern, held, &conditions.fixed, |row| layout.start(row));
+            Held::new::<D>(numbering, pattern, held, &conditions.fixed, |row| addresses.start(row));
         // The terms of a step: a new one is a line here.
         let (frame, symmetric) = (settings.frame, settings.symmetric);
         let mut terms: Vec<Box<dyn Term<D> + 'a>> =
@@ -172,7 +172,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             terms.push(Box::new(ghost));
         }
         terms.extend(further);
-        let beside = vec![0.0; layout.len_beside()];
+        let beside = vec![0.0; addresses.len_beside()];
         Ok(Equilibrium {
             world,
             grid,
@@ -185,7 +185,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             external_owned,
             following: None,
             terms,
-            layout,
+            addresses,
             beside,
             tangent: Tangent::Stale,
             displacement: vec![0.0; numbering.len() * D],
@@ -304,7 +304,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let mut storage = matrix.map(Matrix::storage).transpose()?;
         let base = self.terms.iter().find_map(|term| term.first_in_rows());
         let mut rows = match &mut storage {
-            Some((main, _)) => Some(InPlace::new(&self.layout, main, &mut self.beside, base)?),
+            Some((main, _)) => Some(InPlace::new(&self.addresses, main, &mut self.beside, base)?),
             None => None,
         };
         self.tangent = Tangent::Stale;
@@ -493,7 +493,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         }
         if self.tangent == Tangent::Assembled {
             let (mut main, mut other) = matrix.storage()?;
-            let mut rows = InPlace::filled(&self.layout, &mut main, &mut self.beside)?;
+            let mut rows = InPlace::filled(&self.addresses, &mut main, &mut self.beside)?;
             let scale = self.diagonal_scale;
             self.held.constrain(self.pattern, scale, &mut rows);
             if let Some(other) = &mut other {
@@ -552,7 +552,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         })
     }
 
-    fn excess(&self) -> f64 {
+    fn error_over_tolerance(&self) -> f64 {
         self.errors.last().map_or(f64::INFINITY, |error| error / self.settings.tolerance)
     }
 

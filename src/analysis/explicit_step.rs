@@ -237,7 +237,7 @@ fn increments<const D: usize>(
     Increments {
         deformation,
         averaged,
-        displacement: mapping::places(step, moved),
+        displacement: mapping::displacements(step, moved),
         corners: Vec::new(),
     }
 }

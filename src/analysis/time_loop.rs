@@ -228,7 +228,7 @@ fn finish<const D: usize>(
         run.model.grid = grid;
     }
     let mut row = solved.row;
-    row.moved_points = run.settle()?;
+    row.moved_points = run.migrate_and_balance()?;
     let Run { world, model, points, recorder, clock } = run;
     row.wall_seconds = clock.elapsed();
     clock.time(Phase::Output, || recorder.step(world, points, &row, manner.newton, moment))?;

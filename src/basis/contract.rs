@@ -127,7 +127,7 @@ impl<const D: usize> Basis<D> for Mpm {
         points: &Points<D>,
         influences: &mut Influences<D>,
     ) -> Result<()> {
-        radial::turn_points(grid, points, influences)
+        radial::rings_of_points(grid, points, influences)
     }
 }
 
@@ -171,7 +171,7 @@ impl<const D: usize> Basis<D> for Gimp {
         points: &Points<D>,
         influences: &mut Influences<D>,
     ) -> Result<()> {
-        radial::turn_domains(grid, points, influences)
+        radial::rings_of_domains(grid, points, influences)
     }
 }
 

@@ -8,7 +8,7 @@
 
 use crate::error::{Error, Result};
 use crate::grid::bins::REACH;
-use crate::grid::{Grid, Values};
+use crate::grid::{Grid, ShapeFunctions};
 use crate::points::Points;
 
 use super::Row;
@@ -71,7 +71,7 @@ pub(crate) fn for_each_place<const D: usize>(
     p: usize,
     corners: &[[f64; D]; 8],
     hint: &mut Option<usize>,
-    mut visit: impl FnMut(usize, &Values),
+    mut visit: impl FnMut(usize, &ShapeFunctions),
 ) -> Result<()> {
     let corners = &corners[..1 << D];
     let centre =

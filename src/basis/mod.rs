@@ -61,12 +61,12 @@ pub struct Influences<const D: usize> {
     /// The hoop row that F-bar takes in its place, 1/m; empty without F-bar or axisymmetry.
     pub centre_hoop: Vec<f64>,
     /// Where the nodes come from, of bases that collect them place by place.
-    pub cells: Cells,
+    pub cells: PointCells,
 }
 
 /// Cells of each point, ascending, in compressed rows; no rows for bases of a lattice's axes.
 #[derive(Debug, Clone, Default)]
-pub struct Cells {
+pub struct PointCells {
     /// End of each row.
     ends: Vec<usize>,
     cells: Vec<usize>,
@@ -74,7 +74,7 @@ pub struct Cells {
     chosen: FxHashMap<usize, usize>,
 }
 
-impl Cells {
+impl PointCells {
     fn push(&mut self, cells: &[usize]) {
         self.cells.extend_from_slice(cells);
         self.ends.push(self.cells.len());
@@ -107,7 +107,7 @@ impl<const D: usize> Influences<D> {
             centre_gradients: Vec::new(),
             hoop: Vec::new(),
             centre_hoop: Vec::new(),
-            cells: Cells::default(),
+            cells: PointCells::default(),
         }
     }
 

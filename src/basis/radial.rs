@@ -29,7 +29,7 @@ use crate::points::Points;
 /// Makes the rows those of rings: fills `hoop`, and weighs those of `gimp` by the radius. With
 /// centres, the rows of F-bar have been filled by [`super::centre`] before. Error: a point that is not
 /// off the axis, by id and place.
-pub fn turn<const D: usize>(
+pub fn make_rings<const D: usize>(
     grid: &Grid<D>,
     basis: &dyn Basis<D>,
     points: &Points<D>,
@@ -42,7 +42,7 @@ pub fn turn<const D: usize>(
     basis.make_rings(grid, points, influences)
 }
 
-pub(super) fn turn_points<const D: usize>(
+pub(super) fn rings_of_points<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     influences: &mut Influences<D>,
@@ -63,7 +63,7 @@ pub(super) fn turn_points<const D: usize>(
     Ok(())
 }
 
-pub(super) fn turn_domains<const D: usize>(
+pub(super) fn rings_of_domains<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     influences: &mut Influences<D>,

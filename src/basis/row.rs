@@ -1,7 +1,7 @@
 //! One point's nodes while they are collected from several places.
 
 use crate::error::Result;
-use crate::grid::{Interpolation, Values};
+use crate::grid::{Interpolation, ShapeFunctions};
 use crate::points::Points;
 
 use super::Influences;
@@ -30,7 +30,7 @@ impl<const D: usize> Row<D> {
     }
 
     /// Adds a corner: S += `weight` N(x) and dS += `gradient` N(x).
-    pub fn add_corner(&mut self, at: &Values, weight: f64, gradient: &[f64; D]) {
+    pub fn add_corner(&mut self, at: &ShapeFunctions, weight: f64, gradient: &[f64; D]) {
         self.cells.push(at.cell);
         for (&node, &n) in at.nodes.iter().zip(&at.weights).take(at.count) {
             self.entries.push((node, weight * n, gradient.map(|g| g * n)));

@@ -21,6 +21,7 @@
 //! | `solid/` | regions bounded by triangles: STL files, terrain |
 //! | `crossing.rs` | where lines and boxes meet the boundary of a region |
 
+mod choices;
 mod crossing;
 pub mod explain;
 pub mod expression;
@@ -43,7 +44,6 @@ pub mod stage;
 pub mod templates;
 mod tree;
 mod unread;
-mod words;
 
 use std::path::{Path, PathBuf};
 

@@ -30,7 +30,7 @@ impl Cell {
 }
 
 /// The cells of this rank, in their order, and those of others that are known.
-pub(crate) struct Cells {
+pub(crate) struct KnownCells {
     first: usize,
     /// Place in `own` of the cells from `first` on; empty where they lie far apart.
     table: Vec<u32>,
@@ -41,7 +41,7 @@ pub(crate) struct Cells {
     pub others: FxHashMap<usize, Cell>,
 }
 
-impl Cells {
+impl KnownCells {
     pub fn new(populated: &[(usize, u64)]) -> Self {
         let first = populated.first().map_or(0, |own| own.0);
         let range = populated.last().map_or(0, |own| own.0 + 1 - first);
@@ -55,7 +55,7 @@ impl Cells {
         let own =
             populated.iter().map(|own| Cell { populated: own.1, ..Cell::default() }).collect();
         let numbers = populated.iter().map(|own| own.0).collect();
-        Cells { first, table, numbers, own, others: FxHashMap::default() }
+        KnownCells { first, table, numbers, own, others: FxHashMap::default() }
     }
 
     #[inline]
@@ -71,7 +71,7 @@ impl Cells {
     }
 
     /// Takes in the [`Cell::record`]s of cells of other ranks.
-    pub fn learn(&mut self, records: &[u64]) {
+    pub fn insert_records(&mut self, records: &[u64]) {
         for record in records.chunks_exact(4) {
             let state = Cell { populated: record[1], boundary: record[2], bridge: record[3] };
             self.others.insert(record[0] as usize, state);

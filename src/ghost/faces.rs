@@ -17,7 +17,7 @@ use crate::error::Result;
 use crate::grid::{FacePair, Grid};
 use crate::parallel::{Partition, World, exchange};
 
-use super::cells::{BoundaryFace, Cells};
+use super::cells::{BoundaryFace, KnownCells};
 use super::ties::ties;
 
 /// Finds the boundary faces and ties whose lower cell this rank owns, in ascending order.
@@ -31,7 +31,7 @@ pub fn boundary_faces<const D: usize>(
     partition: &Partition<D>,
     populated: &[(usize, u64)],
 ) -> Result<Vec<BoundaryFace>> {
-    let mut cells = Cells::new(populated);
+    let mut cells = KnownCells::new(populated);
     let mut owned: Vec<usize> = populated.iter().map(|&(cell, _)| cell).collect();
     share_border_cells(world, grid, partition, &owned, &mut cells)?;
 
@@ -93,7 +93,7 @@ fn bridges<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,
-    cells: &Cells,
+    cells: &KnownCells,
 ) -> Vec<(usize, u64)> {
     let here = world.rank();
     let mut candidates = Vec::new();
@@ -124,7 +124,7 @@ fn share_border_cells<const D: usize>(
     grid: &Grid<D>,
     partition: &Partition<D>,
     owned: &[usize],
-    cells: &mut Cells,
+    cells: &mut KnownCells,
 ) -> Result<()> {
     let here = world.rank();
     if world.size() == 1 {
@@ -149,7 +149,7 @@ fn share_border_cells<const D: usize>(
         }
     }
     for (_, words) in exchange(world, outgoing.into_iter().collect())? {
-        cells.learn(&words);
+        cells.insert_records(&words);
     }
     Ok(())
 }

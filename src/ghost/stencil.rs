@@ -52,7 +52,7 @@ pub fn face_stencils<const D: usize>(
         .map(|face| {
             let mut jump = grid.face_jump(face.pair)?;
             if symmetry == Symmetry::Axisymmetric {
-                jump.turn();
+                jump.make_ring();
             }
             let count = jump.nodes.len();
             let h = jump.size;

@@ -15,7 +15,7 @@ use crate::error::Result;
 use crate::grid::{FacePair, Grid};
 use crate::parallel::{Partition, World, exchange};
 
-use super::cells::{BoundaryFace, Cell, Cells};
+use super::cells::{BoundaryFace, Cell, KnownCells};
 
 /// The ties whose lower cell this rank owns, in ascending order. `boundary` lists its boundary
 /// cells; `cells` knows all cells with a face at them. Collective.
@@ -23,7 +23,7 @@ pub(crate) fn ties<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,
-    cells: &mut Cells,
+    cells: &mut KnownCells,
     boundary: &[(usize, u64)],
 ) -> Result<Vec<BoundaryFace>> {
     let mut patches: FxHashMap<usize, (Patch, u64)> = FxHashMap::default();
@@ -87,7 +87,7 @@ impl Patch {
     }
 
     /// Pairs that tie the groups of one body's cells to the largest of them.
-    fn loose(&self, cells: &Cells, body: u64) -> Vec<FacePair> {
+    fn loose(&self, cells: &KnownCells, body: u64) -> Vec<FacePair> {
         let state: Vec<Cell> =
             self.cells.iter().map(|&cell| cells.get(cell).copied().unwrap_or_default()).collect();
         let filled = |at: usize| state[at].populated & body != 0;
@@ -129,7 +129,7 @@ fn fetch<'a, const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,
-    cells: &mut Cells,
+    cells: &mut KnownCells,
     patches: impl Iterator<Item = &'a Patch>,
 ) -> Result<()> {
     if world.size() == 1 {
@@ -152,7 +152,7 @@ fn fetch<'a, const D: usize>(
         answers.push((rank, known.flatten().collect()));
     }
     for (_, words) in exchange(world, answers)? {
-        cells.learn(&words);
+        cells.insert_records(&words);
     }
     Ok(())
 }

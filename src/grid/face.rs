@@ -36,7 +36,7 @@ const GAUSS_UNIT: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 impl FaceJump {
     /// Makes it a face of a body of revolution about the axis x = 0: measures become those of the whole
     /// turn, m^D.
-    pub fn turn(&mut self) {
+    pub fn make_ring(&mut self) {
         for ((weight, _), radius) in self.points.iter_mut().zip(&self.radii) {
             *weight *= TAU * radius;
         }

@@ -165,7 +165,7 @@ fn draft<const D: usize>(contents: &Contents, element: Element, path: &Path) -> 
                 let cell = draft.cell_labels.len() as u32;
                 draft.cell_labels.push(label);
                 let mut nodes: Vec<u32> = nodes.iter().map(|label| number[label]).collect();
-                turn(element, &draft.positions, &mut nodes);
+                make_right_handed(element, &draft.positions, &mut nodes);
                 draft.cells.extend(nodes);
                 for tag in &tags {
                     draft.cell_sets.entry(tag.clone()).or_default().push(cell);
@@ -205,7 +205,7 @@ fn check_flat(places: &[[f64; 3]], labels: &[u64], path: &Path) -> Result<()> {
 /// Turns the nodes of a cell that is listed clockwise, or left-handed: its content (area, volume;
 /// of a hexahedron the Jacobian at the centre times 8) is negative. The mesh's check finds cells
 /// that are bent or folded.
-fn turn<const D: usize>(element: Element, positions: &[[f64; D]], nodes: &mut [u32]) {
+fn make_right_handed<const D: usize>(element: Element, positions: &[[f64; D]], nodes: &mut [u32]) {
     let x: Vec<[f64; D]> = nodes.iter().map(|&node| positions[node as usize]).collect();
     let at_centre = element.shape_gradients(&element.reference_centre());
     if element::determinant(&element::jacobian(&x, &at_centre)) < 0.0 {

@@ -8,7 +8,7 @@ use super::{Grid, Lattice, Mesh};
 
 /// The basis's values at one place: a cell and its nodes in cell order.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Values {
+pub struct ShapeFunctions {
     pub cell: usize,
     /// How many entries of the arrays count.
     pub count: usize,
@@ -21,7 +21,7 @@ pub struct Values {
 /// The basis at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interpolation<const D: usize> {
-    pub values: Values,
+    pub values: ShapeFunctions,
     /// dN_a/dx, 1/m
     pub gradients: [[f64; D]; 8],
 }
@@ -103,7 +103,7 @@ impl<const D: usize> Grid<D> {
         centre: &[f64; D],
         allowance: f64,
         hint: Option<usize>,
-    ) -> Option<Values> {
+    ) -> Option<ShapeFunctions> {
         match self {
             Grid::Lattice(lattice) => {
                 let mut low = lattice_cell(lattice, x, allowance)?;
@@ -198,9 +198,9 @@ fn values_on_lattice<const D: usize>(
     lattice: &Lattice<D>,
     low: [usize; D],
     local: &[f64; D],
-) -> Values {
+) -> ShapeFunctions {
     let cell = lattice.cell_at(low);
-    let mut values = Values { cell, count: 1 << D, nodes: [0; 8], weights: [0.0; 8] };
+    let mut values = ShapeFunctions { cell, count: 1 << D, nodes: [0; 8], weights: [0.0; 8] };
     for (a, corner) in CELL_CORNERS.iter().enumerate().take(1 << D) {
         values.nodes[a] = lattice.node_at(std::array::from_fn(|axis| low[axis] + corner[axis]));
         values.weights[a] = (0..D).map(|axis| share(corner[axis], local[axis])).product();
@@ -208,10 +208,15 @@ fn values_on_lattice<const D: usize>(
     values
 }
 
-fn values_on_mesh<const D: usize>(mesh: &Mesh<D>, cell: usize, xi: &[f64; D]) -> Values {
+fn values_on_mesh<const D: usize>(mesh: &Mesh<D>, cell: usize, xi: &[f64; D]) -> ShapeFunctions {
     let mut nodes = [0; 8];
     for (out, &node) in nodes.iter_mut().zip(mesh.nodes_of(cell)) {
         *out = node as usize;
     }
-    Values { cell, count: mesh.element.node_count(), nodes, weights: mesh.element.shape(xi) }
+    ShapeFunctions {
+        cell,
+        count: mesh.element.node_count(),
+        nodes,
+        weights: mesh.element.shape(xi),
+    }
 }

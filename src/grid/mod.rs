@@ -34,7 +34,7 @@ mod topology;
 mod tests;
 
 pub use face::FaceJump;
-pub use interpolate::{Interpolation, Values};
+pub use interpolate::{Interpolation, ShapeFunctions};
 pub use lattice::Lattice;
 pub use mesh::Mesh;
 

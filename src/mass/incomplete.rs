@@ -71,13 +71,13 @@ impl Incomplete {
         diagonal: &[f64],
     ) -> Self {
         let mut factor = Incomplete::plan(border_order(world.rank()), order, numbering, pattern);
-        let places = factor.places(numbering);
+        let position = factor.position(numbering);
         let mut spread = vec![0.0; numbering.len()];
         let (inner, all) = (factor.inner, factor.order.len());
-        factor.make(0..inner, matrix, pattern, diagonal, &places, &mut spread);
+        factor.make(0..inner, matrix, pattern, diagonal, &position, &mut spread);
         factor.receive_ghost_rows(world, numbering);
-        factor.make(inner..all, matrix, pattern, diagonal, &places, &mut spread);
-        factor.send_copied_rows(world, numbering, &places);
+        factor.make(inner..all, matrix, pattern, diagonal, &position, &mut spread);
+        factor.send_copied_rows(world, numbering, &position);
         factor
     }
 
@@ -89,7 +89,7 @@ impl Incomplete {
         matrix: &BlockMatrix<1>,
         pattern: &Pattern,
         diagonal: &[f64],
-        places: &[u32],
+        position: &[u32],
         spread: &mut [f64],
     ) {
         let mut earlier = Vec::new();
@@ -101,9 +101,9 @@ impl Incomplete {
                 earlier.clear();
                 earlier.extend(entries.filter(|&entry| {
                     let column = pattern.columns[entry] as usize;
-                    places[column] < places[row] && self.inverse_diagonal[column] > 0.0
+                    position[column] < position[row] && self.inverse_diagonal[column] > 0.0
                 }));
-                let place = |entry: &usize| places[pattern.columns[*entry] as usize];
+                let place = |entry: &usize| position[pattern.columns[*entry] as usize];
                 if !earlier.is_sorted_by_key(place) {
                     earlier.sort_unstable_by_key(place);
                 }
@@ -137,8 +137,8 @@ impl Incomplete {
     }
 
     /// Where each local node stands in the elimination; those of later ranks never come.
-    fn places(&self, numbering: &Numbering) -> Vec<u32> {
-        let mut places = vec![u32::MAX; numbering.len()];
+    fn position(&self, numbering: &Numbering) -> Vec<u32> {
+        let mut position = vec![u32::MAX; numbering.len()];
         let mut earlier: Vec<(usize, Range<usize>)> =
             numbering.halo.ghosts().filter(|(rank, _)| border_order(*rank) < self.here).collect();
         earlier.sort_unstable_by_key(|(rank, _)| border_order(*rank));
@@ -146,9 +146,9 @@ impl Incomplete {
         let (inner, border) = self.order.split_at(self.inner);
         let sequence = inner.iter().copied().chain(ghosts).chain(border.iter().copied());
         for (place, node) in sequence.enumerate() {
-            places[node as usize] = place as u32;
+            position[node as usize] = place as u32;
         }
-        places
+        position
     }
 
     /// Turns the entries from `begin` on, those of the newest row of M, into that row of L;
@@ -195,7 +195,7 @@ impl Incomplete {
     }
 
     /// Sends the rows of copied nodes to the ranks whose border comes later.
-    fn send_copied_rows(&self, world: &World, numbering: &Numbering, places: &[u32]) {
+    fn send_copied_rows(&self, world: &World, numbering: &Numbering, position: &[u32]) {
         let mut lists = Vec::new();
         for (rank, copied) in
             numbering.halo.copies().filter(|(rank, _)| border_order(*rank) > self.here)
@@ -209,7 +209,7 @@ impl Incomplete {
                 for entry in self.row(node as usize) {
                     let column = self.columns[entry] as usize;
                     // Inner nodes meet no node of the other rank.
-                    if places[column] as usize >= self.inner {
+                    if position[column] as usize >= self.inner {
                         let node = numbering.nodes[column] as u64;
                         entries.push(FactorEntry { node, value: self.values[entry] });
                     }
@@ -335,9 +335,9 @@ mod tests {
         let order = Order { nodes: (0..rows as u32).collect(), inner: rows };
         let mut factor = Incomplete::plan(0, order, &numbering, &pattern);
         assert_eq!((factor.inner, factor.order.len()), (rows, rows));
-        let places = factor.places(&numbering);
+        let position = factor.position(&numbering);
         let mut spread = vec![0.0; rows];
-        factor.make(0..rows, &matrix, &pattern, &diagonal, &places, &mut spread);
+        factor.make(0..rows, &matrix, &pattern, &diagonal, &position, &mut spread);
         assert_eq!(spread, vec![0.0; rows]);
         let x = field(rows);
         let b: Vec<[f64; 2]> = (0..rows)

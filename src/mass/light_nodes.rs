@@ -25,7 +25,7 @@ use super::grid_mass::GridMass;
 /// Shares of the largest nodal mass, and of g, up to which a node is light. Nodes of true, if tiny,
 /// overlaps lie far above both: they belong to the published schemes.
 const OF_LARGEST: f64 = 1e-12;
-const OF_GRIP: f64 = 1e-9;
+const OF_COUPLING: f64 = 1e-9;
 /// Weight of its other nodes that a point needs to carry light ones.
 const ENOUGH: f64 = 1e-3;
 
@@ -34,7 +34,7 @@ pub struct LightNodes {
     /// Of local nodes.
     light: Vec<bool>,
     /// Σ_p g_Ip at local light nodes, kg.
-    grip: Vec<f64>,
+    coupling: Vec<f64>,
     /// m
     size: f64,
 }
@@ -57,12 +57,13 @@ impl LightNodes {
         if -extremes[1] > limit {
             return Ok(None);
         }
-        let mut found = LightNodes { light: vec![false; mesh.numbering.len()], grip: vec![], size };
-        let grip = found.grips(world, mesh, step);
+        let mut found =
+            LightNodes { light: vec![false; mesh.numbering.len()], coupling: vec![], size };
+        let coupling = found.couplings(world, mesh, step);
         let mut marks = vec![0.0; mesh.numbering.len()];
         for node in 0..owned {
-            let light = mass[node] <= limit && mass[node] <= OF_GRIP * grip[node][0];
-            marks[node] = f64::from(u8::from(light && grip[node][0] > 0.0));
+            let light = mass[node] <= limit && mass[node] <= OF_COUPLING * coupling[node][0];
+            marks[node] = f64::from(u8::from(light && coupling[node][0] > 0.0));
         }
         mesh.numbering.halo.forward(world, &mut marks, 1)?;
         found.light = marks.iter().map(|mark| *mark > 0.0).collect();
@@ -70,10 +71,10 @@ impl LightNodes {
             return Ok(None);
         }
         // Of the points that have other nodes to carry them by.
-        found.grip = found.grips(world, mesh, step).into_flattened();
-        mesh.numbering.halo.forward(world, &mut found.grip, 1)?;
-        for (light, grip) in found.light.iter_mut().zip(&found.grip) {
-            *light &= *grip > 0.0;
+        found.coupling = found.couplings(world, mesh, step).into_flattened();
+        mesh.numbering.halo.forward(world, &mut found.coupling, 1)?;
+        for (light, coupling) in found.light.iter_mut().zip(&found.coupling) {
+            *light &= *coupling > 0.0;
         }
         let mut sums: Vec<[f64; 1]> = mass.iter().map(|m| [*m]).collect();
         found.hand_on(world, mesh, step, &mut sums, &[])?;
@@ -96,7 +97,7 @@ impl LightNodes {
         for node in (0..owned).filter(|&node| self.light[node]) {
             for i in 0..B {
                 if !held.get(node * B + i).copied().unwrap_or(false) {
-                    share[node][i] = std::mem::take(&mut sums[node][i]) / self.grip[node];
+                    share[node][i] = std::mem::take(&mut sums[node][i]) / self.coupling[node];
                 }
             }
         }
@@ -104,9 +105,9 @@ impl LightNodes {
         let [more] = over_points(world, mesh, |part, [more]: [&mut [[f64; B]]; 1]| {
             self.for_each_carrier(step, part, |p, carrying| {
                 let mut taken = [0.0; B];
-                for (node, grip) in self.reach(step, p) {
+                for (node, coupling) in self.reach(step, p) {
                     for i in 0..B {
-                        taken[i] += grip * share[node][i];
+                        taken[i] += coupling * share[node][i];
                     }
                 }
                 let row = step.influences.row(p);
@@ -151,9 +152,9 @@ impl LightNodes {
                         }
                     }
                 }
-                for (node, grip) in self.reach(step, p) {
+                for (node, coupling) in self.reach(step, p) {
                     for i in 0..D {
-                        sums[node][i] += grip * value[i];
+                        sums[node][i] += coupling * value[i];
                     }
                 }
             });
@@ -161,7 +162,7 @@ impl LightNodes {
         for node in (0..mesh.numbering.owned).filter(|&node| self.light[node]) {
             for i in 0..D {
                 if !held[node * D + i] {
-                    nodal[node * D + i] = sums[node][i] / self.grip[node];
+                    nodal[node * D + i] = sums[node][i] / self.coupling[node];
                 }
             }
         }
@@ -170,25 +171,25 @@ impl LightNodes {
 
     /// Σ_p g_Ip over the points that can carry, at owned nodes: of light nodes, or of all while none
     /// is known. Collective.
-    fn grips<const D: usize>(
+    fn couplings<const D: usize>(
         &self,
         world: &World,
         mesh: &Discretisation<D>,
         step: StepPoints<'_, D>,
     ) -> Vec<[f64; 1]> {
         let known = self.light.contains(&true);
-        let [grip] = over_points(world, mesh, |part, [grip]: [&mut [[f64; 1]]; 1]| {
+        let [coupling] = over_points(world, mesh, |part, [coupling]: [&mut [[f64; 1]]; 1]| {
             if known {
                 self.for_each_carrier(step, part, |p, _| {
-                    self.reach(step, p).for_each(|(node, g)| grip[node][0] += g);
+                    self.reach(step, p).for_each(|(node, g)| coupling[node][0] += g);
                 });
             } else {
                 for p in part {
-                    self.all(step, p).for_each(|(node, g)| grip[node][0] += g);
+                    self.all(step, p).for_each(|(node, g)| coupling[node][0] += g);
                 }
             }
         });
-        grip
+        coupling
     }
 
     /// Calls `visit` with the points among `part` that reach light nodes and have others, and the

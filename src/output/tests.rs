@@ -18,7 +18,7 @@ use super::series::points_file::PointsSeries;
 use super::summary::Summary;
 use super::tables::csv_table::Mark;
 use super::tables::history::History;
-use super::tables::history::{HistoryRow, Layout, Reaction};
+use super::tables::history::{HistoryColumns, HistoryRow, Reaction};
 use super::tables::residuals::Residuals;
 use super::terminal::log::Log;
 use crate::deck::model::{Basis, Element, Format, Symmetry};
@@ -235,7 +235,8 @@ fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
     log.attach(&directory, false, comm).unwrap();
     log.note("after");
     directory.write_decks("title = 'a'\n", "title = \"a\"\n", comm).unwrap();
-    let layout = || Layout { dimension: 2, boundaries: vec!["root".into()], ..Default::default() };
+    let layout =
+        || HistoryColumns { dimension: 2, boundaries: vec!["root".into()], ..Default::default() };
     let row = |step| HistoryRow {
         step,
         residual: 1.0 / 3.0,

@@ -46,7 +46,7 @@ pub struct Balance {
 
 /// What a step's end did.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Settled {
+pub struct Balanced {
     /// Share of the points that changed rank.
     pub moved: f64,
     /// Largest over mean cost of the ranks afterwards.
@@ -91,7 +91,7 @@ impl Balance {
     /// Migrates the points; where max/mean exceeds the deck's limit, tries a new partition and keeps
     /// it if it is clearly better. `busy`: seconds of work of this rank so far
     /// (`record::clock::Clock::busy`). Collective.
-    pub fn settle<const D: usize>(
+    pub fn migrate_and_balance<const D: usize>(
         &mut self,
         world: &World,
         settings: &Parallel,
@@ -99,7 +99,7 @@ impl Balance {
         partition: &mut Partition<D>,
         points: &mut Points<D>,
         busy: f64,
-    ) -> Result<Settled> {
+    ) -> Result<Balanced> {
         self.measure(busy, points.len());
         let all = world.sum_usize(points.len()).max(1) as f64;
         let mut moved = migrate(world, partition, grid, points)?;
@@ -123,7 +123,7 @@ impl Balance {
                 None => self.refused = before,
             }
         }
-        Ok(Settled { moved: moved as f64 / all, imbalance: of_loads(world, load) })
+        Ok(Balanced { moved: moved as f64 / all, imbalance: of_loads(world, load) })
     }
 }
 

@@ -9,7 +9,7 @@ use crate::grid::Grid;
 use crate::points::Points;
 use crate::points::seed::CellByCell;
 use crate::points::share::Share;
-use crate::points::sort::{sort_by_cell, take_places};
+use crate::points::sort::{fill_gaps, sort_by_cell};
 
 /// Moves the points and leaves each rank's nearly sorted by (cell, id): [`sort_by_cell`]. Returns
 /// how many changed rank, over all ranks. Collective. Error, the same on all ranks: a point outside
@@ -47,13 +47,13 @@ pub fn migrate_from<const D: usize>(
     }
     // The sender located the same position with the same arithmetic.
     append_cells(grid, points, &mut cells)?;
-    take_places(points, &mut cells, &places(&leaving), own);
+    fill_gaps(points, &mut cells, &indices(&leaving), own);
     Ok(moved)
 }
 
 /// As [`migrate_from`] for points as they were seeded: those that `seeding` can make are made where
 /// they arrive, which is quicker than sending them. Same points in the same order. Collective.
-pub fn settle<const D: usize>(
+pub fn distribute_seeded<const D: usize>(
     world: &World,
     partition: &Partition<D>,
     grid: &Grid<D>,
@@ -94,11 +94,11 @@ pub fn settle<const D: usize>(
         cells.truncate(own);
         return migrate_from(world, partition, grid, points, cells);
     }
-    take_places(points, &mut cells, &places(&leaving), own);
+    fill_gaps(points, &mut cells, &indices(&leaving), own);
     Ok(moved)
 }
 
-fn places(leaving: &[(usize, usize)]) -> Vec<usize> {
+fn indices(leaving: &[(usize, usize)]) -> Vec<usize> {
     leaving.iter().map(|&(p, _)| p).collect()
 }
 

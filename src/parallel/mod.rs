@@ -33,7 +33,7 @@ pub mod world;
 
 pub use exchange::exchange;
 pub use halo::{HaloPlan, exchange_known};
-pub use migrate::{migrate, settle};
+pub use migrate::{distribute_seeded, migrate};
 pub use partition::Partition;
 pub use traffic::Traffic;
 pub use world::World;

@@ -12,7 +12,7 @@ use super::check::{keep, petsc};
 use super::object::Object;
 use super::sys;
 use super::vector::DETERMINE;
-use super::vector::{Index, Values, ValuesMut, index};
+use super::vector::{Index, LocalValues, LocalValuesMut, index};
 use crate::blocks::{Blocks, Half, Stored};
 use crate::error::{Error, Result};
 use crate::tensor::fused::Block;
@@ -300,7 +300,7 @@ impl<T: Stored> Context<T> {
         }
         {
             // SAFETY: PETSc's vectors live through the call and are distinct, as `MatMult` asks.
-            let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
+            let (x, mut y) = unsafe { (LocalValues::of(x)?, LocalValuesMut::of(y)?) };
             if add {
                 self.product.multiply_own_add(&x, &mut y);
             } else {
@@ -310,7 +310,8 @@ impl<T: Stored> Context<T> {
         if let Some(ghosts) = &self.ghosts {
             petsc!(VecScatterEnd(ghosts.scatter.0, x, ghosts.values.0, insert, forward))?;
             // SAFETY: as above; the ghosts are this object's.
-            let (values, mut y) = unsafe { (Values::of(ghosts.values.0)?, ValuesMut::of(y)?) };
+            let (values, mut y) =
+                unsafe { (LocalValues::of(ghosts.values.0)?, LocalValuesMut::of(y)?) };
             self.product.other.multiply_add(&values, &mut y);
         }
         Ok(())
@@ -321,11 +322,11 @@ impl<T: Stored> Context<T> {
         let (add, back) = (sys::ADD_VALUES, sys::SCATTER_REVERSE);
         {
             // SAFETY: as in `multiply`.
-            let (x, mut y) = unsafe { (Values::of(x)?, ValuesMut::of(y)?) };
+            let (x, mut y) = unsafe { (LocalValues::of(x)?, LocalValuesMut::of(y)?) };
             self.product.multiply_own_transposed(&x, &mut y);
             if let Some(ghosts) = &self.ghosts {
                 // SAFETY: as in `multiply`.
-                let mut values = unsafe { ValuesMut::of(ghosts.values.0)? };
+                let mut values = unsafe { LocalValuesMut::of(ghosts.values.0)? };
                 self.product.other.multiply_transposed(&x, &mut values);
             }
         }
@@ -380,7 +381,7 @@ unsafe extern "C" fn get_diagonal<T: Stored>(
 ) -> sys::PetscErrorCode {
     with_context::<T>(shell, |context| {
         // SAFETY: PETSc's vector lives through the call.
-        let mut values = unsafe { ValuesMut::of(diagonal)? };
+        let mut values = unsafe { LocalValuesMut::of(diagonal)? };
         let entries = context.product.diagonal();
         if values.len() != entries.len() {
             return Err(Error::Environment("this matrix has no diagonal".into()));

@@ -46,16 +46,16 @@ impl Forcing {
         }
     }
 
-    /// The relative tolerance of the next solve. `norm`: of its right-hand side; `excess`: the
+    /// The relative tolerance of the next solve. `norm`: of its right-hand side; `error_over_tolerance`: the
     /// error before it over the error that is enough, of which less than its inverse is idle.
-    pub fn next(&mut self, norm: f64, excess: f64) -> f64 {
+    pub fn next(&mut self, norm: f64, error_over_tolerance: f64) -> f64 {
         let rule = match self.last {
             None => self.first,
             Some((before, eta)) => {
                 let rule = self.gamma * (norm / before).powf(self.alpha);
                 let kept = self.gamma * eta.powf(self.alpha);
                 let rule = if kept > self.threshold { rule.max(kept) } else { rule };
-                rule.max(REMAINDER / excess)
+                rule.max(REMAINDER / error_over_tolerance)
             }
         };
         // Both also take the place of what is not a number.

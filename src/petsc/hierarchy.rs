@@ -144,7 +144,7 @@ impl Installed {
     }
 
     /// Takes note of a solve: levels that have become slow are not kept.
-    pub fn learn(&mut self, iterations: usize, tolerance: f64) {
+    pub fn record_solve(&mut self, iterations: usize, tolerance: f64) {
         let (iterations, digits) = (iterations as f64, -tolerance.log10());
         match self.pace {
             None => self.pace = Some(iterations / digits),

@@ -12,7 +12,7 @@ use super::check::{keep, petsc, text_of};
 use super::ksp::{self, Ksp, KspOutcome};
 use super::object::Object;
 use super::vector::DETERMINE;
-use super::vector::{Values, ValuesMut, Vector, index};
+use super::vector::{LocalValues, LocalValuesMut, Vector, index};
 use super::{Matrix, sys};
 use crate::error::Result;
 
@@ -138,7 +138,7 @@ unsafe extern "C" fn multiply<S: ShellSystem>(
         // SAFETY: the system that `solve` borrows, of the type it set this function for; PETSc's
         // vectors live through the call and are distinct, as `MatMult` asks.
         let (system, x, mut y) =
-            unsafe { (&mut *data.cast::<S>(), Values::of(x)?, ValuesMut::of(y)?) };
+            unsafe { (&mut *data.cast::<S>(), LocalValues::of(x)?, LocalValuesMut::of(y)?) };
         system.multiply(&x, &mut y)
     }))
 }
@@ -152,7 +152,7 @@ unsafe extern "C" fn precondition<S: ShellSystem>(
     code(petsc!(PCShellGetContext(pc, (&raw mut data).cast())).and_then(|()| {
         // SAFETY: as in `multiply`.
         let (system, r, mut z) =
-            unsafe { (&mut *data.cast::<S>(), Values::of(r)?, ValuesMut::of(z)?) };
+            unsafe { (&mut *data.cast::<S>(), LocalValues::of(r)?, LocalValuesMut::of(z)?) };
         system.precondition(&r, &mut z)
     }))
 }

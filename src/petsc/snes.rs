@@ -17,7 +17,7 @@ use super::forcing::{self, Forcing};
 use super::hierarchy::{self, Hierarchy, Installed};
 use super::ksp::{self, Ranks};
 use super::vector::DEFAULT;
-use super::vector::{Index, Values, ValuesMut, index};
+use super::vector::{Index, LocalValues, LocalValuesMut, index};
 use super::{BlockProduct, Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
@@ -56,7 +56,7 @@ pub trait NewtonProblem {
 
     /// Error of the iterate assessed last over the error that is enough: an iterative linear
     /// solver need not reduce it by much more. Infinite: unknown. The same on all ranks.
-    fn excess(&self) -> f64 {
+    fn error_over_tolerance(&self) -> f64 {
         f64::INFINITY
     }
 
@@ -287,7 +287,7 @@ impl Drop for Snes {
 
 impl<P: NewtonProblem> Context<'_, P> {
     /// Makes the ranks agree; an error is kept for `solve` and stops PETSc's loop.
-    fn settle<T>(
+    fn agree_on<T>(
         &mut self,
         result: Result<T>,
         then: impl FnOnce(&mut Self, T) -> Result<()>,
@@ -365,11 +365,11 @@ unsafe extern "C" fn residual<P: NewtonProblem>(
     // during the callback.
     let context = unsafe { &mut *data.cast::<Context<P>>() };
     // SAFETY: PETSc's vectors live through the call and are distinct.
-    let result = unsafe { Values::of(x) }.and_then(|x| {
-        let mut f = unsafe { ValuesMut::of(f) }?;
+    let result = unsafe { LocalValues::of(x) }.and_then(|x| {
+        let mut f = unsafe { LocalValuesMut::of(f) }?;
         context.problem.residual(&x, &mut f, context.matrix)
     });
-    context.settle(result, |context, inside| {
+    context.agree_on(result, |context, inside| {
         context.outside = context.largest(i32::from(!inside)) == 1;
         if context.outside { petsc!(SNESSetFunctionDomainError(snes)) } else { Ok(()) }
     })
@@ -386,8 +386,8 @@ unsafe extern "C" fn jacobian<P: NewtonProblem>(
     let context = unsafe { &mut *data.cast::<Context<P>>() };
     // SAFETY: PETSc's vector lives through the call.
     let result =
-        unsafe { Values::of(x) }.and_then(|x| context.problem.jacobian(&x, context.matrix));
-    context.settle(result, |_, ()| Ok(()))
+        unsafe { LocalValues::of(x) }.and_then(|x| context.problem.jacobian(&x, context.matrix));
+    context.agree_on(result, |_, ()| Ok(()))
 }
 
 unsafe extern "C" fn before_solve<P: NewtonProblem>(
@@ -399,14 +399,14 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     // SAFETY: as in `residual`.
     let context = unsafe { &mut *data.cast::<Context<P>>() };
     // SAFETY: PETSc's vector lives through the call, and this hook may change it.
-    let result =
-        unsafe { ValuesMut::of(rhs) }.and_then(|mut rhs| context.problem.before_solve(&mut rhs));
-    context.settle(result, |context, ()| {
+    let result = unsafe { LocalValuesMut::of(rhs) }
+        .and_then(|mut rhs| context.problem.before_solve(&mut rhs));
+    context.agree_on(result, |context, ()| {
         context.renew_levels(inner)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, DEFAULT as f64);
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;
-        let eta = forcing.next(norm, context.problem.excess());
+        let eta = forcing.next(norm, context.problem.error_over_tolerance());
         petsc!(KSPSetTolerances(inner, eta, default, default, DEFAULT))
     })
 }
@@ -425,7 +425,7 @@ unsafe extern "C" fn after_solve<P: NewtonProblem>(
         petsc!(KSPGetTolerances(inner, &mut tolerance, null_mut(), null_mut(), null_mut()))?;
         context.linear_tolerances.push(tolerance);
         if let Some(levels) = &mut context.levels {
-            levels.learn(outcome.iterations, tolerance);
+            levels.record_solve(outcome.iterations, tolerance);
         }
         context.linear_solves += 1;
         context.linear_total += outcome.iterations;
@@ -456,7 +456,7 @@ unsafe extern "C" fn assess<P: NewtonProblem>(
     let context = unsafe { &mut *data.cast::<Context<P>>() };
     let iteration = iteration.max(0) as usize;
     let result = judge(context, snes, iteration);
-    context.settle(result, |context, verdict| {
+    context.agree_on(result, |context, verdict| {
         let (code, text) = match verdict {
             Verdict::Converged if iteration > 0 => (0, None),
             Verdict::Converged | Verdict::Continue => (1, None),
@@ -486,6 +486,6 @@ fn judge<P: NewtonProblem>(
     petsc!(SNESGetSolution(snes, &mut x))?;
     petsc!(SNESGetFunction(snes, &mut f, null_mut(), null_mut()))?;
     // SAFETY: the solver's vectors live through the convergence test and nobody writes them.
-    let (x, f) = unsafe { (Values::of(x)?, Values::of(f)?) };
+    let (x, f) = unsafe { (LocalValues::of(x)?, LocalValues::of(f)?) };
     context.problem.assess(iteration, &x, &f)
 }

@@ -62,13 +62,13 @@ impl Vector {
     }
 
     /// This rank's values, to read. Local.
-    pub fn values(&self) -> Result<Values<'_>> {
-        Values::borrow(self)
+    pub fn values(&self) -> Result<LocalValues<'_>> {
+        LocalValues::borrow(self)
     }
 
     /// This rank's values, to read and write. Local.
-    pub fn values_mut(&mut self) -> Result<ValuesMut<'_>> {
-        ValuesMut::borrow(self)
+    pub fn values_mut(&mut self) -> Result<LocalValuesMut<'_>> {
+        LocalValuesMut::borrow(self)
     }
 
     /// Sets all values.
@@ -117,13 +117,13 @@ impl Drop for Vector {
 }
 
 /// Local values of a vector, read only.
-pub struct Values<'v> {
+pub struct LocalValues<'v> {
     raw: sys::Vec,
     pointer: *const f64,
     slice: &'v [f64],
 }
 
-impl<'v> Values<'v> {
+impl<'v> LocalValues<'v> {
     fn borrow(vector: &'v Vector) -> Result<Self> {
         // SAFETY: the guard cannot outlive the borrow of the vector.
         unsafe { Self::of(vector.raw) }
@@ -142,18 +142,18 @@ impl<'v> Values<'v> {
             // SAFETY: PETSc returned `count` values that stay in place until the restore.
             unsafe { std::slice::from_raw_parts(pointer, count as usize) }
         };
-        Ok(Values { raw, pointer, slice })
+        Ok(LocalValues { raw, pointer, slice })
     }
 }
 
-impl Deref for Values<'_> {
+impl Deref for LocalValues<'_> {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
         self.slice
     }
 }
 
-impl Drop for Values<'_> {
+impl Drop for LocalValues<'_> {
     fn drop(&mut self) {
         // SAFETY: returns what `of` took.
         unsafe { sys::VecRestoreArrayRead(self.raw, &mut self.pointer) };
@@ -161,13 +161,13 @@ impl Drop for Values<'_> {
 }
 
 /// Local values of a vector, to read and write.
-pub struct ValuesMut<'v> {
+pub struct LocalValuesMut<'v> {
     raw: sys::Vec,
     pointer: *mut f64,
     slice: &'v mut [f64],
 }
 
-impl<'v> ValuesMut<'v> {
+impl<'v> LocalValuesMut<'v> {
     fn borrow(vector: &'v mut Vector) -> Result<Self> {
         // SAFETY: the guard cannot outlive the exclusive borrow of the vector.
         unsafe { Self::of(vector.raw) }
@@ -186,24 +186,24 @@ impl<'v> ValuesMut<'v> {
             // SAFETY: PETSc returned `count` values, ours alone until the restore.
             unsafe { std::slice::from_raw_parts_mut(pointer, count as usize) }
         };
-        Ok(ValuesMut { raw, pointer, slice })
+        Ok(LocalValuesMut { raw, pointer, slice })
     }
 }
 
-impl Deref for ValuesMut<'_> {
+impl Deref for LocalValuesMut<'_> {
     type Target = [f64];
     fn deref(&self) -> &[f64] {
         self.slice
     }
 }
 
-impl DerefMut for ValuesMut<'_> {
+impl DerefMut for LocalValuesMut<'_> {
     fn deref_mut(&mut self) -> &mut [f64] {
         self.slice
     }
 }
 
-impl Drop for ValuesMut<'_> {
+impl Drop for LocalValuesMut<'_> {
     fn drop(&mut self) {
         // SAFETY: returns what `of` took; this also tells PETSc that the values changed.
         unsafe { sys::VecRestoreArray(self.raw, &mut self.pointer) };

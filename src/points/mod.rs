@@ -102,7 +102,7 @@ macro_rules! point_fields {
                 self.id.push(words[0].to_bits());
                 self.body.push(words[1].to_bits() as u32);
                 let mut rest = &words[2..];
-                $( let value = <$type as Words>::read_words(&mut rest);
+                $( let value = <$type as Packed>::read_words(&mut rest);
                 if self.carries(stringify!($name)) {
                     self.$name.push(value);
                 } )*
@@ -347,7 +347,7 @@ impl<const D: usize> Points<D> {
 
     /// Makes rings of the points from `first` on: volumes and masses of the section become those of the
     /// whole turn about the axis x = 0 (Pappus: 2π times the radius of the section's centroid).
-    pub fn turn(&mut self, first: usize) {
+    pub fn make_rings(&mut self, first: usize) {
         for p in first..self.len() {
             let around = TAU * self.position_initial[p][0];
             self.volume_initial[p] *= around;
@@ -412,12 +412,12 @@ pub fn rectangle_corners<const D: usize>(x: [f64; D], half: [f64; D]) -> [[f64; 
 }
 
 /// A field's value as `f64` words.
-pub trait Words: Sized {
+pub trait Packed: Sized {
     fn write_words(&self, out: &mut Vec<f64>);
     fn read_words(words: &mut &[f64]) -> Self;
 }
 
-impl Words for f64 {
+impl Packed for f64 {
     fn write_words(&self, out: &mut Vec<f64>) {
         out.push(*self);
     }
@@ -428,7 +428,7 @@ impl Words for f64 {
     }
 }
 
-impl<const D: usize> Words for [f64; D] {
+impl<const D: usize> Packed for [f64; D] {
     fn write_words(&self, out: &mut Vec<f64>) {
         out.extend_from_slice(self);
     }
@@ -437,7 +437,7 @@ impl<const D: usize> Words for [f64; D] {
     }
 }
 
-impl<const D: usize, const N: usize> Words for [[f64; D]; N] {
+impl<const D: usize, const N: usize> Packed for [[f64; D]; N] {
     fn write_words(&self, out: &mut Vec<f64>) {
         for row in self {
             out.extend_from_slice(row);
@@ -448,7 +448,7 @@ impl<const D: usize, const N: usize> Words for [[f64; D]; N] {
     }
 }
 
-impl Words for Matrix3<f64> {
+impl Packed for Matrix3<f64> {
     fn write_words(&self, out: &mut Vec<f64>) {
         out.extend_from_slice(self.as_slice());
     }

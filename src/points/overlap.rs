@@ -1,6 +1,6 @@
 //! Do two bodies lie in one place? Their mass would count twice there.
 //!
-//! A place is shared if both shapes hold it with some room: bodies that touch, along a face or in
+//! A place is shared if both shapes hold it with some margin: bodies that touch, along a face or in
 //! a cell, do not overlap.
 
 use crate::deck::model::{Body, BodySource, Deck};
@@ -10,9 +10,9 @@ use crate::grid::Grid;
 
 use super::Points;
 
-/// Room around a place that counts as shared, and how far out in its domain a point looks, as
+/// Margin around a place that counts as shared, and how far out in its domain a point looks, as
 /// shares of the domain's half length.
-const ROOM: f64 = 1e-3;
+const MARGIN: f64 = 1e-3;
 const REACH: f64 = 0.95;
 
 /// An error that names two bodies and a place, found among this rank's points.
@@ -32,18 +32,18 @@ pub fn check<const D: usize>(deck: &Deck, grid: &Grid<D>, points: &Points<D>) ->
     for p in 0..points.len() {
         let own = points.body[p] as usize;
         let (x, half) = (&points.position[p], &points.half_length[p]);
-        let room = padded(&half.map(|length| ROOM * length));
+        let margin = padded(&half.map(|length| MARGIN * length));
         for (other, region) in regions.iter().enumerate() {
             let Some(region) = region else { continue };
             if other == own || allowed(&bodies[own], &bodies[other]) || region.misses(x, half) {
                 continue;
             }
-            let place = places(x, half).find(|place| {
+            let place = sample_points(x, half).find(|place| {
                 let at = padded(place);
                 let held = regions[own]
                     .as_ref()
-                    .map_or(place == x, |own| own.shape.side(at, room) == Side::Inside);
-                held && region.shape.side(at, room) == Side::Inside
+                    .map_or(place == x, |own| own.shape.side(at, margin) == Side::Inside);
+                held && region.shape.side(at, margin) == Side::Inside
             });
             if let Some(place) = place {
                 let (first, second) = (own.min(other), own.max(other));
@@ -110,7 +110,7 @@ impl<'a> Region<'a> {
 }
 
 /// The middle of a domain and places near its corners.
-fn places<const D: usize>(x: &[f64; D], half: &[f64; D]) -> impl Iterator<Item = [f64; D]> {
+fn sample_points<const D: usize>(x: &[f64; D], half: &[f64; D]) -> impl Iterator<Item = [f64; D]> {
     let (x, half) = (*x, *half);
     let corner = move |k: usize| -> [f64; D] {
         std::array::from_fn(|a| {

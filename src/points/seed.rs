@@ -65,7 +65,7 @@ pub fn seed<const D: usize>(
         if deck.analysis.symmetry == Symmetry::Axisymmetric
             && !matches!(body.source, BodySource::File(_))
         {
-            points.turn(made);
+            points.make_rings(made);
         }
         // A file may have velocities of its own.
         if !matches!(body.source, BodySource::File(_)) || moves(body) {
@@ -120,7 +120,7 @@ impl<'a, const D: usize> CellByCell<'a, D> {
             let made = points.len();
             cells.run(points, share, wanted, self.first_ids[body]);
             if self.symmetry == Symmetry::Axisymmetric {
-                points.turn(made);
+                points.make_rings(made);
             }
             set_velocity(points, made, cells.body);
         }

@@ -12,7 +12,7 @@ const STRAYS: usize = 50;
 /// places that are left with the last points, and sorts as [`sort_by_cell`] does. What leaves and
 /// what arrives in a step lies along the same borders: the order hardly suffers, and all the others
 /// stay where they are.
-pub fn take_places<const D: usize>(
+pub fn fill_gaps<const D: usize>(
     points: &mut Points<D>,
     cells: &mut Vec<usize>,
     gone: &[usize],
@@ -89,11 +89,11 @@ mod tests {
     }
 
     #[test]
-    fn arrivals_take_places() {
+    fn arrivals_fill_gaps() {
         let count = 10 * STRAYS;
         let mut points = points(0..count + 1);
         let mut cells: Vec<usize> = (0..count).chain([4]).collect();
-        take_places(&mut points, &mut cells, &[1, 7], count);
+        fill_gaps(&mut points, &mut cells, &[1, 7], count);
         assert_eq!(
             (points.len(), points.mass.len(), cells.len()),
             (count - 1, count - 1, count - 1)

@@ -194,7 +194,7 @@ pub fn find<const D: usize>(
 }
 
 /// A run that is made shorter has to end behind its checkpoint. Error: exit code 3.
-pub fn require_room<const D: usize>(deck: &Deck, found: &Restored<D>) -> Result<()> {
+pub fn require_later_end<const D: usize>(deck: &Deck, found: &Restored<D>) -> Result<()> {
     let analysis = &deck.analysis;
     let behind = match (analysis.steps, analysis.duration) {
         // The trials of a strength reduction follow its steps.
@@ -224,11 +224,11 @@ fn error_text(text: &str) -> String {
 pub fn advice(world: &World, out: &Path) -> String {
     let newest = listed(world, out).ok().and_then(|known| known.into_iter().next());
     let newest = newest.as_deref().and_then(Path::file_name).map(|name| name.to_string_lossy());
-    let room = "make room (disk, quota, file-size limit) or mend the disk";
+    let remedy = "make room (disk, quota, file-size limit) or mend the disk";
     match newest {
-        Some(name) => format!("{room}, then go on from {name} with --restart last"),
+        Some(name) => format!("{remedy}, then go on from {name} with --restart last"),
         None => format!(
-            "{room}, then start again with --force; output.checkpoint = {{ every = 10 }} lets a run \
+            "{remedy}, then start again with --force; output.checkpoint = {{ every = 10 }} lets a run \
              go on where it ended"
         ),
     }

@@ -29,13 +29,13 @@ impl<const D: usize> Run<'_, D> {
 
     /// Points to their ranks, and a new partition where the old one has become uneven; the share of
     /// the points that changed rank. Collective.
-    pub fn settle(&mut self) -> Result<f64> {
+    pub fn migrate_and_balance(&mut self) -> Result<f64> {
         let Run { world, model, points, clock, .. } = self;
         let busy = clock.busy();
-        let settled = clock.time(Phase::Migrate, || {
+        let balanced = clock.time(Phase::Migrate, || {
             let Model { deck, grid, partition, balance, .. } = model;
-            balance.settle(world, &deck.parallel, grid, partition, points, busy)
+            balance.migrate_and_balance(world, &deck.parallel, grid, partition, points, busy)
         })?;
-        Ok(settled.moved)
+        Ok(balanced.moved)
     }
 }

@@ -21,7 +21,7 @@ use crate::output::summary::{Communication, Count, Status};
 use crate::output::summary::{StageSummary, Summary};
 use crate::output::tables::csv_table::Mark;
 use crate::output::tables::history::History;
-use crate::output::tables::history::{HistoryRow, Layout};
+use crate::output::tables::history::{HistoryColumns, HistoryRow};
 use crate::output::tables::residuals::Residuals;
 use crate::output::terminal::log::Log;
 use crate::output::terminal::progress::{Interval, NewtonReport, Progress, StepReport};
@@ -179,7 +179,7 @@ impl Recorder {
         let Opening { directory, mut log, versions, checkpointer, resume, followed, verbose } =
             opening;
         let comm = world.comm();
-        let layout = Layout {
+        let layout = HistoryColumns {
             whole: deck.analysis.symmetry == Symmetry::Axisymmetric,
             dimension: deck.dimension,
             boundaries: deck.boundaries.iter().map(|boundary| boundary.name.clone()).collect(),

@@ -195,7 +195,7 @@ impl Start<'_> {
             }
             Some(choice) => {
                 let found = checkpointing::find::<D>(world, &physics, choice, out, &mut self.log)?;
-                checkpointing::require_room(&deck, &found)?;
+                checkpointing::require_later_end(&deck, &found)?;
                 self.log.say(&report::restart(&found.path, found.step, found.ranks, world.size()));
                 let resume = Resume {
                     state: found.state.clone(),

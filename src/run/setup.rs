@@ -30,7 +30,7 @@ use crate::system::model::Model;
 pub fn prepare<const D: usize>(world: &World, mut deck: Deck) -> Result<(Model<D>, Points<D>)> {
     memory::require::<D>(world, &deck)?;
     let grid = world.fail_together(build_grid(&deck))?;
-    tell_cells(&mut deck, &grid);
+    set_cell_size(&mut deck, &grid);
     check_tags(&deck, &grid)?;
     check_basis(&deck, &grid)?;
     let share = Share { rank: world.rank(), ranks: world.size() };
@@ -43,7 +43,7 @@ pub fn prepare<const D: usize>(world: &World, mut deck: Deck) -> Result<(Model<D
         Initial::Slabs => Partition::slabs(world, &grid, brick, &cells)?,
     };
     let seeding = CellByCell::new(&deck, &grid, first_ids)?;
-    parallel::settle(world, &partition, &grid, &mut points, cells, &seeding)?;
+    parallel::distribute_seeded(world, &partition, &grid, &mut points, cells, &seeding)?;
     let mut found = find_carriers(world, &deck, &grid, &points)?;
     hold_constant_forces(&deck, &mut found, &mut points);
     let materials = materials::of_bodies(&deck);
@@ -55,8 +55,8 @@ pub fn prepare<const D: usize>(world: &World, mut deck: Deck) -> Result<(Model<D
     Ok((model, points))
 }
 
-/// Tells the materials how wide the cells are.
-fn tell_cells<const D: usize>(deck: &mut Deck, grid: &Grid<D>) {
+/// Gives the materials the width of a cell.
+fn set_cell_size<const D: usize>(deck: &mut Deck, grid: &Grid<D>) {
     let cell = grid.cell_size();
     deck.materials.iter_mut().for_each(|material| material.cell = cell);
 }
@@ -101,7 +101,7 @@ pub fn restore<const D: usize>(
     restored: Restored<D>,
 ) -> Result<(Model<D>, Points<D>)> {
     let mut grid = world.fail_together(build_grid(&deck))?;
-    tell_cells(&mut deck, &grid);
+    set_cell_size(&mut deck, &grid);
     let materials = materials::of_bodies(&deck);
     let all = match deck.has_passing_bodies() {
         true => Some(seeded(world, &deck, &grid, &materials)?),

@@ -23,13 +23,13 @@ use super::numbering::{Numbering, Touched};
 const NEAR: f64 = 1e-8;
 
 /// A point on a face, and the cells that hold it.
-struct Place {
+struct FacePoint {
     point: usize,
     cells: Vec<usize>,
 }
 
 /// Chooses the cells of the `mpm` rows of points on faces, for analyses with a mass. Collective.
-pub fn settle<const D: usize>(
+pub fn choose_cells<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,
@@ -41,7 +41,7 @@ pub fn settle<const D: usize>(
         return Ok(());
     }
     // Nodes off the face have a weight of exactly zero from here on.
-    for Place { point, cells } in &places {
+    for FacePoint { point, cells } in &places {
         influences.replace_row(grid, *point, &points.position[*point], cells[0]);
     }
     let mut reached: Vec<usize> = Vec::new();
@@ -56,7 +56,7 @@ pub fn settle<const D: usize>(
     for cell in places.iter().flat_map(|place| &place.cells) {
         grid.cell_nodes(*cell, &mut reached);
     }
-    let touched = Touched::settle(world, grid, partition, reached)?;
+    let touched = Touched::assign(world, grid, partition, reached)?;
     let numbering = Numbering::build(world, touched.owned, &touched.foreign)?;
     let mut carried = vec![0.0; numbering.len()];
     let mut on_face = vec![false; points.len()];
@@ -80,7 +80,7 @@ pub fn settle<const D: usize>(
         grid.cell_nodes(cell, &mut nodes);
         nodes.iter().all(|&node| numbering.local(node).is_some_and(|node| carried[node] > 0.0))
     };
-    for Place { point, cells } in &places {
+    for FacePoint { point, cells } in &places {
         if let Some(&cell) = cells.iter().find(|&&cell| whole(cell))
             && cell != cells[0]
         {
@@ -95,7 +95,7 @@ fn on_faces<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     influences: &Influences<D>,
-) -> Vec<Place> {
+) -> Vec<FacePoint> {
     let mut places = Vec::new();
     for p in 0..influences.len() {
         let weights = &influences.weights[influences.row(p)];
@@ -106,7 +106,7 @@ fn on_faces<const D: usize>(
         grid.cells_at(&points.position[p], &mut cells);
         let outside = cells.len() == 1 && weights.iter().any(|weight| *weight < 0.0);
         if cells.len() > 1 || outside {
-            places.push(Place { point: p, cells });
+            places.push(FacePoint { point: p, cells });
         }
     }
     places

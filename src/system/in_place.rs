@@ -31,7 +31,7 @@ fn prefetch(values: &[f64]) {
 /// Where the block rows of a pattern lie. Addresses below `main` are in the solver's array, the
 /// others in ours.
 #[derive(Debug)]
-pub struct Layout<const B: usize> {
+pub struct RowAddresses<const B: usize> {
     /// Address of the first value of each row.
     starts: Vec<usize>,
     /// Values in own columns, all of them in the solver's array.
@@ -56,10 +56,10 @@ struct BorderRow {
     outside: usize,
 }
 
-impl<const B: usize> Layout<B> {
+impl<const B: usize> RowAddresses<B> {
     pub fn new(numbering: &Numbering, pattern: &Pattern) -> Self {
         let rows = pattern.offsets.len().saturating_sub(1);
-        let mut layout = Layout {
+        let mut addresses = RowAddresses {
             starts: Vec::with_capacity(rows),
             main: 0,
             other: 0,
@@ -69,7 +69,7 @@ impl<const B: usize> Layout<B> {
         };
         let own = |&column: &u32| (column as usize) < numbering.owned;
         for row in 0..numbering.owned {
-            layout.starts.push(layout.main);
+            addresses.starts.push(addresses.main);
             let columns = &pattern.columns[pattern.offsets[row]..pattern.offsets[row + 1]];
             let mut count = columns.len();
             // Without ghosts there is nothing to look for.
@@ -78,29 +78,29 @@ impl<const B: usize> Layout<B> {
             }
             if count < columns.len() {
                 let left = columns.iter().take_while(|c| !own(c)).count();
-                layout.border.push(BorderRow {
+                addresses.border.push(BorderRow {
                     row: row as u32,
                     left: left as u32,
                     own: count as u32,
                     width: columns.len() as u32,
-                    inside: layout.main,
-                    outside: layout.other,
+                    inside: addresses.main,
+                    outside: addresses.other,
                 });
-                layout.other += B * B * (columns.len() - count);
+                addresses.other += B * B * (columns.len() - count);
             }
-            layout.main += B * B * count;
+            addresses.main += B * B * count;
         }
-        layout.end = layout.main;
-        for border in &layout.border {
-            layout.starts[border.row as usize] = layout.end;
-            layout.end += B * B * border.width as usize;
+        addresses.end = addresses.main;
+        for border in &addresses.border {
+            addresses.starts[border.row as usize] = addresses.end;
+            addresses.end += B * B * border.width as usize;
         }
-        layout.ghosts = layout.end;
+        addresses.ghosts = addresses.end;
         for row in numbering.owned..rows {
-            layout.starts.push(layout.end);
-            layout.end += B * B * (pattern.offsets[row + 1] - pattern.offsets[row]);
+            addresses.starts.push(addresses.end);
+            addresses.end += B * B * (pattern.offsets[row + 1] - pattern.offsets[row]);
         }
-        layout
+        addresses
     }
 
     /// Address of the first value of a row.
@@ -117,7 +117,7 @@ impl<const B: usize> Layout<B> {
 
 /// The rows while they are written.
 pub struct InPlace<'a, const B: usize> {
-    layout: &'a Layout<B>,
+    addresses: &'a RowAddresses<B>,
     main: &'a mut [f64],
     beside: &'a mut [f64],
     /// Rows not met yet.
@@ -127,32 +127,32 @@ pub struct InPlace<'a, const B: usize> {
 }
 
 impl<'a, const B: usize> InPlace<'a, B> {
-    /// `main`: the solver's values in own columns; `beside`: [`Layout::len_beside`] of ours. All rows
+    /// `main`: the solver's values in own columns; `beside`: [`RowAddresses::len_beside`] of ours. All rows
     /// are taken to hold nothing yet.
     pub fn new(
-        layout: &'a Layout<B>,
+        addresses: &'a RowAddresses<B>,
         main: &'a mut [f64],
         beside: &'a mut [f64],
         base: Option<(&'a BlockMatrix<1>, &'a [bool])>,
     ) -> Result<Self> {
-        if main.len() != layout.main || beside.len() != layout.len_beside() {
+        if main.len() != addresses.main || beside.len() != addresses.len_beside() {
             return Err(Error::Environment(format!(
                 "the solver stores {} values where the system has {}",
                 main.len(),
-                layout.main
+                addresses.main
             )));
         }
-        let fresh = vec![true; layout.starts.len()];
-        Ok(InPlace { layout, main, beside, fresh, base })
+        let fresh = vec![true; addresses.starts.len()];
+        Ok(InPlace { addresses, main, beside, fresh, base })
     }
 
     /// The same rows, already assembled.
     pub fn filled(
-        layout: &'a Layout<B>,
+        addresses: &'a RowAddresses<B>,
         main: &'a mut [f64],
         beside: &'a mut [f64],
     ) -> Result<Self> {
-        let mut rows = Self::new(layout, main, beside, None)?;
+        let mut rows = Self::new(addresses, main, beside, None)?;
         rows.fresh.clear();
         Ok(rows)
     }
@@ -173,17 +173,17 @@ impl<'a, const B: usize> InPlace<'a, B> {
     /// Copies the rows of the border into the solver's arrays; `other` holds the values in
     /// columns of other ranks.
     pub fn hand_over(&mut self, other: &mut [f64]) -> Result<()> {
-        if other.len() != self.layout.other {
+        if other.len() != self.addresses.other {
             return Err(Error::Environment(format!(
                 "the solver stores {} values in columns of other ranks where the system has {}",
                 other.len(),
-                self.layout.other
+                self.addresses.other
             )));
         }
-        for border in &self.layout.border {
+        for border in &self.addresses.border {
             let [left, own, width] =
                 [border.left, border.own, border.width].map(|n| n as usize * B);
-            let start = self.layout.starts[border.row as usize] - self.layout.main;
+            let start = self.addresses.starts[border.row as usize] - self.addresses.main;
             for i in 0..B {
                 let source = &self.beside[start + i * width..start + (i + 1) * width];
                 let inside = border.inside + i * own;
@@ -200,7 +200,7 @@ impl<'a, const B: usize> InPlace<'a, B> {
 impl<const B: usize> BlockRows<B> for InPlace<'_, B> {
     #[inline(always)]
     fn start(&self, _: &Pattern, row: usize) -> usize {
-        self.layout.starts[row]
+        self.addresses.starts[row]
     }
 
     #[inline(always)]
@@ -219,7 +219,7 @@ impl<const B: usize> BlockRows<B> for InPlace<'_, B> {
             return;
         }
         let width = pattern.offsets[row + 1] - pattern.offsets[row];
-        let (start, length) = (self.layout.starts[row], B * B * width);
+        let (start, length) = (self.addresses.starts[row], B * B * width);
         // Rows are mostly met in their order.
         if let Some(ahead) = self.main.get(start + AHEAD * length..start + (AHEAD + 1) * length) {
             prefetch(ahead);
@@ -233,6 +233,6 @@ impl<const B: usize> BlockRows<B> for InPlace<'_, B> {
     }
 
     fn ghosts(&self, _: &Pattern) -> &[f64] {
-        &self.beside[self.layout.ghosts - self.layout.main..]
+        &self.beside[self.addresses.ghosts - self.addresses.main..]
     }
 }

@@ -5,8 +5,8 @@
 use crate::mechanics::{Contribution, Hoop};
 use crate::tensor::fused::multiply_add;
 
-use super::places::Place;
 use super::scatter::BlockRows;
+use super::support_columns::ColumnRuns;
 
 /// Rows of a tile: so many gradients share each load of a flux.
 const TALL: usize = 4;
@@ -173,7 +173,7 @@ impl Batch {
     #[inline(always)]
     pub fn flush<const D: usize, const FUSED: bool, R: BlockRows<D>>(
         &mut self,
-        place: Place<'_>,
+        place: ColumnRuns<'_>,
         rows: &[(usize, usize)],
         values: &mut R,
     ) {
@@ -222,7 +222,7 @@ impl Batch {
     #[inline(always)]
     fn flush_one<const D: usize, const FUSED: bool, R: BlockRows<D>>(
         &mut self,
-        place: Place<'_>,
+        place: ColumnRuns<'_>,
         rows: &[(usize, usize)],
         values: &mut R,
     ) {
@@ -239,7 +239,7 @@ impl Batch {
     #[inline(always)]
     fn products<const D: usize, const LENGTH: usize, const FUSED: bool, R: BlockRows<D>>(
         &self,
-        place: Place<'_>,
+        place: ColumnRuns<'_>,
         rows: &[(usize, usize)],
         values: &mut R,
     ) {

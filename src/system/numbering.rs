@@ -37,8 +37,8 @@ pub struct Touched {
 }
 
 impl Touched {
-    /// Settles who owns the nodes in `reached` (any order, duplicates allowed). Collective.
-    pub fn settle<const D: usize>(
+    /// Assigns to their owners the nodes in `reached` (any order, duplicates allowed). Collective.
+    pub fn assign<const D: usize>(
         world: &World,
         grid: &Grid<D>,
         partition: &Partition<D>,

@@ -9,7 +9,7 @@ use super::border::Border;
 use super::graph::{Lists, neighbours};
 use super::node_index::NodeIndex;
 use super::numbering::{Numbering, Touched};
-use super::places::Places;
+use super::support_columns::SupportColumns;
 
 /// Exact sparsity of one rank's rows, in blocks of one node.
 #[derive(Debug, Default)]
@@ -30,7 +30,7 @@ pub struct Pattern {
     /// Local nodes of each support, in the order they were given.
     pub supports: Lists,
     /// Where the block of each support lies.
-    pub places: Places,
+    pub support_columns: SupportColumns,
 }
 
 /// Numbers the active nodes and builds their graph. `supports` are the node lists (global
@@ -92,8 +92,8 @@ pub fn build<'a>(
         final_rows.close();
     }
     let touched = local.iter().enumerate().map(|(i, &this)| (this, i, holders.list(i)));
-    let places = Places::find(&lists, touched, &final_rows, &numbering.global);
-    let places = world.fail_together(places)?;
+    let support_columns = SupportColumns::find(&lists, touched, &final_rows, &numbering.global);
+    let support_columns = world.fail_together(support_columns)?;
     let ghost_start = final_rows.offsets[numbering.owned];
     let mut pattern = Pattern {
         offsets: final_rows.offsets,
@@ -103,7 +103,7 @@ pub fn build<'a>(
         sends: Vec::new(),
         receives: Vec::new(),
         supports: lists,
-        places,
+        support_columns,
     };
     pattern.plan_exchange(world, &numbering, &ghosts)?;
     Ok((numbering, pattern))

@@ -90,15 +90,15 @@ impl Populated {
 }
 
 /// Cells, ascending, each with the bits of its bodies.
-type Cells = Vec<(usize, u64)>;
+type CellBodies = Vec<(usize, u64)>;
 
 /// Entries `cell * groups + group`, ascending, as cells with the bits of the first group, and those
 /// of each other group.
-fn by_group(entries: Cells, groups: usize) -> (Cells, Vec<Cells>) {
+fn by_group(entries: CellBodies, groups: usize) -> (CellBodies, Vec<CellBodies>) {
     if groups == 1 {
         return (entries, Vec::new());
     }
-    let mut all = Cells::new();
+    let mut all = CellBodies::new();
     let mut further = vec![Vec::new(); groups - 1];
     for (entry, bodies) in entries {
         let (cell, group) = (entry / groups, entry % groups);

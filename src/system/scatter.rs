@@ -93,7 +93,7 @@ impl<const B: usize> BlockMatrix<B> {
 /// Adds a dense matrix over the nodes of a support of the pattern, row by row.
 pub fn add_support(matrix: &mut BlockMatrix<1>, pattern: &Pattern, support: usize, block: &[f64]) {
     let nodes = pattern.supports.list(support);
-    let place = pattern.places.of(support);
+    let place = pattern.support_columns.of(support);
     let width = nodes.len() / place.run;
     let rows = block.chunks_exact(nodes.len()).zip(place.positions.chunks_exact(width));
     for (&node, (source, positions)) in nodes.iter().zip(rows) {

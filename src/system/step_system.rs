@@ -37,7 +37,7 @@ pub struct Discretisation<const D: usize> {
     pub pattern: Pattern,
     /// How firmly each local node holds material: the weight, and for `mpm` the size of the
     /// gradients too, which is finite where a point on a cell's edge has no weight.
-    pub node_grip: Vec<f64>,
+    pub node_coupling: Vec<f64>,
     /// Local nodes that a Ghost face stabilises.
     pub on_face: Vec<bool>,
     /// Cells of the faces owned here.
@@ -112,14 +112,14 @@ impl<const D: usize> Discretisation<D> {
         let (grid, partition) = (&model.grid, &model.partition);
         let mut influences = world.fail_together(basis.map_points(grid, points))?;
         if basis.of_one_cell() && coupling != Coupling::Matrix {
-            face_points::settle(world, grid, partition, points, &mut influences)?;
+            face_points::choose_cells(world, grid, partition, points, &mut influences)?;
         }
         if model.deck.method.locking == Locking::FBar {
             let centres = basis.centre_gradients(grid, points, &influences);
             influences.centre_gradients = world.fail_together(centres)?;
         }
         if model.deck.analysis.symmetry == Symmetry::Axisymmetric {
-            let turned = radial::turn(grid, basis, points, &mut influences);
+            let turned = radial::make_rings(grid, basis, points, &mut influences);
             world.fail_together(turned)?;
         }
         let groups = Groups::new(&influences);
@@ -141,7 +141,7 @@ impl<const D: usize> Discretisation<D> {
         if !basis.within_cells() {
             reached.extend_from_slice(&groups.nodes);
         }
-        let touched = Touched::settle(world, grid, partition, reached)?;
+        let touched = Touched::assign(world, grid, partition, reached)?;
         let supports = (0..groups.len())
             .map(|g| groups.nodes(g))
             .chain(faces.iter().map(|face| face.nodes.as_slice()));
@@ -165,7 +165,7 @@ impl<const D: usize> Discretisation<D> {
             .collect();
         let border = Border::new(groups.group_of_point.iter().map(|&group| group_reaches[group]));
         let group_border = Border::new(group_reaches.into_iter());
-        let mut node_grip = vec![0.0; numbering.len()];
+        let mut node_coupling = vec![0.0; numbering.len()];
         if coupling == Coupling::Matrix {
             let reach = if basis.of_one_cell() { grid.cell_size() } else { 0.0 };
             for (p, &group) in groups.group_of_point.iter().enumerate() {
@@ -173,7 +173,7 @@ impl<const D: usize> Discretisation<D> {
                     &group_nodes[groups.node_offsets[group]..groups.node_offsets[group + 1]];
                 for (&node, entry) in nodes.iter().zip(influences.row(p)) {
                     let slope = influences.gradients[entry].iter().map(|g| g * g).sum::<f64>();
-                    node_grip[node as usize] +=
+                    node_coupling[node as usize] +=
                         influences.weights[entry].abs() + reach * slope.sqrt();
                 }
             }
@@ -185,7 +185,7 @@ impl<const D: usize> Discretisation<D> {
                     on_face[node] = 1.0;
                 }
             }
-            for field in [&mut node_grip, &mut on_face] {
+            for field in [&mut node_coupling, &mut on_face] {
                 numbering.halo.reverse_add(world, field, 1)?;
                 numbering.halo.forward(world, field, 1)?;
             }
@@ -200,7 +200,7 @@ impl<const D: usize> Discretisation<D> {
             faces,
             numbering,
             pattern,
-            node_grip,
+            node_coupling,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
             carriers: surface::carriers(model, points),
@@ -241,14 +241,14 @@ impl<const D: usize> Discretisation<D> {
         Ok(sums)
     }
 
-    /// Local nodes that carry no equation of their own: their grip on the material is at most
+    /// Local nodes that carry no equation of their own: their coupling on the material is at most
     /// `threshold` times the largest one, and no Ghost face holds them. Collective.
     pub fn nodes_left_out(&self, world: &World, threshold: f64) -> Vec<bool> {
-        let largest = world.max(self.node_grip.iter().copied().fold(0.0, f64::max));
-        self.node_grip
+        let largest = world.max(self.node_coupling.iter().copied().fold(0.0, f64::max));
+        self.node_coupling
             .iter()
             .zip(&self.on_face)
-            .map(|(&grip, &on_face)| !on_face && grip <= threshold * largest)
+            .map(|(&coupling, &on_face)| !on_face && coupling <= threshold * largest)
             .collect()
     }
 }
@@ -270,7 +270,7 @@ pub fn active<const D: usize>(
     if !basis.within_cells() {
         reached.extend(world.fail_together(basis.map_points(grid, points))?.nodes);
     }
-    let touched = Touched::settle(world, grid, partition, reached)?;
+    let touched = Touched::assign(world, grid, partition, reached)?;
     Ok((populated, Numbering::build(world, touched.owned, &touched.foreign)?))
 }
 

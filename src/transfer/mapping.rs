@@ -232,17 +232,17 @@ pub fn at_points<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<
         .collect()
 }
 
-/// What the places of the points move by: [`at_points`], of rings with the mean that is not weighted by
+/// By how much the points move: [`at_points`], of rings with the mean that is not weighted by
 /// the radius ([`crate::basis::radial`]).
-pub fn places<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<[f64; D]> {
+pub fn displacements<const D: usize>(step: StepPoints<'_, D>, nodal: &[f64]) -> Vec<[f64; D]> {
     match step.influences.hoop.is_empty() {
         true => at_points(step, nodal),
-        false => places_of_rings(step, nodal),
+        false => displacements_of_rings(step, nodal),
     }
 }
 
 /// Σ_v H u / Σ_v H at each ring.
-pub(super) fn places_of_rings<const D: usize>(
+pub(super) fn displacements_of_rings<const D: usize>(
     step: StepPoints<'_, D>,
     nodal: &[f64],
 ) -> Vec<[f64; D]> {

@@ -91,7 +91,7 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
     }
     if !step.influences.hoop.is_empty() {
         made.deformation.hoops = mapping::hoop_increments(step, displacement);
-        made.displacement = mapping::places_of_rings(step, displacement);
+        made.displacement = mapping::displacements_of_rings(step, displacement);
     }
     made.averaged = averaged(step, displacement, &made.deformation);
     made
@@ -146,14 +146,14 @@ pub fn require_sound<const D: usize>(
         let x = points.position[p];
         let moved: [f64; D] = std::array::from_fn(|a| x[a] + increments.displacement[p][a]);
         if moved.iter().any(|m| !m.is_finite()) {
-            return Some(Fault::NotFinite);
+            return Some(IncrementFault::NotFinite);
         }
         let fault = fault_of(p, &increments.deformation, &increments.averaged);
         fault.or_else(|| {
             near.set(grid.locate_near(&moved, near.get()));
             let leaves =
                 || format!("{}: it would move to {moved:?} m", way_out(grid, boundaries, &moved));
-            near.get().is_none().then(|| Fault::Leaves(leaves()))
+            near.get().is_none().then(|| IncrementFault::Leaves(leaves()))
         })
     })
 }
@@ -203,7 +203,7 @@ pub fn require_sound_deformation<const D: usize>(
 }
 
 /// What is wrong with the increment of a point.
-enum Fault {
+enum IncrementFault {
     NotFinite,
     /// det dF
     Inverted(f64),
@@ -217,40 +217,40 @@ fn fault_of<const D: usize>(
     p: usize,
     deformation: &Deformation<D>,
     averaged: &Deformation<D>,
-) -> Option<Fault> {
+) -> Option<IncrementFault> {
     let hoop = 1.0 + deformation.hoops.get(p).copied().unwrap_or(0.0);
     let section = dense::determinant(&dense::plus_unit(&deformation.blocks[p]));
     if !(section * hoop).is_finite() {
-        return Some(Fault::NotFinite);
+        return Some(IncrementFault::NotFinite);
     }
     if section <= 0.0 || hoop <= 0.0 {
-        return Some(Fault::Inverted(section * hoop));
+        return Some(IncrementFault::Inverted(section * hoop));
     }
     let finite = |h: &[[f64; D]; D]| h.as_flattened().iter().all(|v| v.is_finite());
     let unsound = averaged.blocks.get(p).is_some_and(|h| !finite(h))
         || averaged.hoops.get(p).is_some_and(|h| !h.is_finite());
-    unsound.then_some(Fault::Centre)
+    unsound.then_some(IncrementFault::Centre)
 }
 
 /// Refuses the first point of the lowest rank with a fault. Collective.
 fn require<const D: usize>(
     world: &World,
     points: &Points<D>,
-    fault: impl Fn(usize) -> Option<Fault>,
+    fault: impl Fn(usize) -> Option<IncrementFault>,
 ) -> std::result::Result<(), Refusal> {
     let found = (0..points.len()).find_map(|p| fault(p).map(|fault| (p, fault)));
-    let inverted = matches!(found, Some((_, Fault::Inverted(_) | Fault::Centre)));
-    let not_finite = matches!(found, Some((_, Fault::NotFinite)));
+    let inverted = matches!(found, Some((_, IncrementFault::Inverted(_) | IncrementFault::Centre)));
+    let not_finite = matches!(found, Some((_, IncrementFault::NotFinite)));
     let message = found.map(|(p, fault)| {
         let what = match fault {
-            Fault::NotFinite => "has a displacement that is not finite".to_string(),
-            Fault::Inverted(determinant) => {
+            IncrementFault::NotFinite => "has a displacement that is not finite".to_string(),
+            IncrementFault::Inverted(determinant) => {
                 format!("is turned inside out (det dF = {determinant:.3e})")
             }
-            Fault::Centre => {
+            IncrementFault::Centre => {
                 "is in cells that are turned inside out on the mean (det dF_0 <= 0)".to_string()
             }
-            Fault::Leaves(way) => format!("leaves the grid {way}"),
+            IncrementFault::Leaves(way) => format!("leaves the grid {way}"),
         };
         format!("point {} at {:?} {what}", points.id[p], points.position[p])
     });

@@ -422,7 +422,7 @@ fn numbers<const D: usize>(case: &Case, mesh: &Discretisation<D>) -> Numbers {
         groups: per_point(groups.len()),
         group_nodes: per_point(groups.nodes.len()),
         group_pairs: per_point(squares(all_groups)),
-        places: per_point(mesh.pattern.places.len()),
+        places: per_point(mesh.pattern.support_columns.len()),
         cells: per_point(mesh.populated.reached.len()),
         active: per_point(mesh.numbering.len()),
         blocks: per_point(mesh.pattern.columns.len()),

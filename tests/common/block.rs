@@ -1,7 +1,7 @@
 //! Made-up equations of an elastic or flowing block, dealt out to ranks.
 #![allow(dead_code)]
 
-use mpm_par::amg::level::{BlockRows, Nodes};
+use mpm_par::amg::level::{BlockCsr, Nodes};
 use mpm_par::parallel::{HaloPlan, World};
 
 /// A block of `cells` bilinear or trilinear elements of side 1, E = 1, nu = 0.3.
@@ -22,7 +22,7 @@ const HARDENING: f64 = 0.5;
 /// This rank's share of its equations.
 pub struct Share<const D: usize> {
     pub nodes: Nodes,
-    pub rows: BlockRows<D>,
+    pub rows: BlockCsr<D>,
 }
 
 impl<const D: usize> Block<D> {
@@ -155,7 +155,7 @@ impl<const D: usize> Block<D> {
             let ghost = || own.len() + ghosts.partition_point(|g| g.1 < node);
             if own.contains(&node) { node - own.start } else { ghost() }
         };
-        let mut rows = BlockRows { offsets: vec![0], columns: Vec::new(), values: Vec::new() };
+        let mut rows = BlockCsr { offsets: vec![0], columns: Vec::new(), values: Vec::new() };
         for node in own.clone() {
             for other in self.around(node) {
                 rows.columns.push(local(other) as u32);

@@ -2,7 +2,7 @@
 #![allow(dead_code)]
 
 use mpm_par::amg;
-use mpm_par::amg::level::BlockRows;
+use mpm_par::amg::level::BlockCsr;
 use mpm_par::amg::symmetric_part::symmetric_part;
 use mpm_par::error::Result;
 use mpm_par::parallel::World;
@@ -27,8 +27,8 @@ pub struct Hardening<'a, const D: usize> {
 }
 
 impl<const D: usize> Hardening<'_, D> {
-    fn tangent(&self, x: &[f64]) -> BlockRows<D> {
-        let BlockRows { offsets, columns, values } = &self.share.rows;
+    fn tangent(&self, x: &[f64]) -> BlockCsr<D> {
+        let BlockCsr { offsets, columns, values } = &self.share.rows;
         let mut values = values.clone();
         for row in 0..self.share.nodes.owned {
             for k in offsets[row]..offsets[row + 1] {
@@ -39,11 +39,11 @@ impl<const D: usize> Hardening<'_, D> {
                 }
             }
         }
-        BlockRows { offsets: offsets.clone(), columns: columns.clone(), values }
+        BlockCsr { offsets: offsets.clone(), columns: columns.clone(), values }
     }
 
     /// Scalar rows of blocks: offsets, global columns, values.
-    fn scalars(&self, rows: &BlockRows<D>) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
+    fn scalars(&self, rows: &BlockCsr<D>) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
         let (mut offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
         for row in 0..self.share.nodes.owned {
             let range = rows.offsets[row]..rows.offsets[row + 1];
@@ -61,9 +61,9 @@ impl<const D: usize> Hardening<'_, D> {
         (offsets, columns, values)
     }
 
-    fn of_matrix(&self, matrix: &mut Matrix) -> Result<BlockRows<D>> {
+    fn of_matrix(&self, matrix: &mut Matrix) -> Result<BlockCsr<D>> {
         // From the matrix and not from x: what is in it is what counts.
-        let BlockRows { offsets, columns, .. } = &self.share.rows;
+        let BlockCsr { offsets, columns, .. } = &self.share.rows;
         let (own, other) = matrix.storage()?;
         let other = other.as_deref().unwrap_or(&[]);
         let (mut inside, mut outside) = (own.iter(), other.iter());
@@ -82,7 +82,7 @@ impl<const D: usize> Hardening<'_, D> {
                 }
             }
         }
-        Ok(BlockRows { offsets: offsets.clone(), columns: columns.clone(), values })
+        Ok(BlockCsr { offsets: offsets.clone(), columns: columns.clone(), values })
     }
 }
 
@@ -91,7 +91,7 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
         let mut all = x.to_vec();
         all.resize(self.share.nodes.local() * D, 0.0);
         self.share.nodes.halo.forward(self.world, &mut all, D)?;
-        let BlockRows { offsets, columns, values } = &self.share.rows;
+        let BlockCsr { offsets, columns, values } = &self.share.rows;
         for row in 0..self.share.nodes.owned {
             for r in 0..D {
                 let terms = (offsets[row]..offsets[row + 1]).flat_map(|k| {

@@ -166,8 +166,14 @@ fn points_made_where_they_arrive_are_those_that_would_be_sent() {
                 let moved =
                     migrate_from(&world, &partition, after, &mut sent, cells.clone()).unwrap();
                 assert_eq!(moved > 0, world.size() > 1, "something has to move");
-                let settled =
-                    parallel::settle(&world, &partition, after, &mut points, cells, &seeding);
+                let settled = parallel::distribute_seeded(
+                    &world,
+                    &partition,
+                    after,
+                    &mut points,
+                    cells,
+                    &seeding,
+                );
                 assert_eq!(settled.unwrap(), moved);
                 assert!(words(&points) == words(&sent), "{basis}");
             }

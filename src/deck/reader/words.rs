@@ -1,18 +1,18 @@
 //! Words out of a list, and expressions.
 
 use super::Table;
+use crate::deck::choices::Choice;
 use crate::deck::expression::{Expression, Variable};
 use crate::deck::problems::{Got, Reported, nearest};
 use crate::deck::schema::{Key, Kind, Range, quoted};
 use crate::deck::tree::{Node, Origin, Value};
-use crate::deck::words::Words;
 
 impl Table<'_> {
-    fn word<T: Words>(&self, name: &str, word: &str, origin: &Origin) -> Got<T> {
-        if let Some((_, value)) = T::WORDS.iter().find(|(known, _)| *known == word) {
+    fn word<T: Choice>(&self, name: &str, word: &str, origin: &Origin) -> Got<T> {
+        if let Some((_, value)) = T::SPELLINGS.iter().find(|(known, _)| *known == word) {
             return Ok(*value);
         }
-        let names: Vec<&str> = T::WORDS.iter().map(|(known, _)| *known).collect();
+        let names: Vec<&str> = T::SPELLINGS.iter().map(|(known, _)| *known).collect();
         Err(self.unknown_word(name, word, &names, origin))
     }
 
@@ -37,11 +37,11 @@ impl Table<'_> {
     }
 
     /// An enumeration of the model.
-    pub fn choice<T: Words>(&self, name: &str) -> Got<T> {
+    pub fn choice<T: Choice>(&self, name: &str) -> Got<T> {
         self.present(name, self.choice_if(name))
     }
 
-    pub fn choice_if<T: Words>(&self, name: &str) -> Got<Option<T>> {
+    pub fn choice_if<T: Choice>(&self, name: &str) -> Got<Option<T>> {
         self.read(name, |key, node| {
             let text = self.text_in(key, node)?;
             self.word(name, &text, &node.origin)

@@ -14,7 +14,7 @@ use crate::deck::stage::Presence;
 use crate::deck::tree::Value;
 
 /// What bodies and conditions are judged against; parts that could not be read are absent.
-pub struct World<'a> {
+pub struct EarlierSections<'a> {
     pub dimension: usize,
     pub directory: &'a Path,
     pub grid: &'a Grid,
@@ -66,7 +66,7 @@ fn default_name(index: usize) -> String {
     format!("body-{}", index + 1)
 }
 
-pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
+pub fn bodies(root: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Vec<Body>> {
     let (materials, names) = (material_names(root), names(root));
     let bodies = root.tables("body", |index, table| {
         if names[..index].contains(&names[index]) {
@@ -74,14 +74,14 @@ pub fn bodies(root: &Table<'_>, world: &World<'_>) -> Got<Vec<Body>> {
         }
         table.text_if("name")?;
         let material = material(&table, &materials);
-        let density = density(&table, world);
-        let velocity = table.expressions_if("velocity", world.dimension);
+        let density = density(&table, earlier);
+        let velocity = table.expressions_if("velocity", earlier.dimension);
         let overlap = table.choice_of("overlap", &["refuse", "allow"]);
-        let source = table.table("shape", |shape| source(&table, &shape, world));
+        let source = table.table("shape", |shape| source(&table, &shape, earlier));
         let stress =
-            table.table_if("initial_stress", |t| initial_stress::read(&t, world.dimension));
-        let presence = stages::presence(&table, world.stages, Presence::BEFORE);
-        let rest = || vec![Expression::constant(0.0); world.dimension];
+            table.table_if("initial_stress", |t| initial_stress::read(&t, earlier.dimension));
+        let presence = stages::presence(&table, earlier.stages, Presence::BEFORE);
+        let rest = || vec![Expression::constant(0.0); earlier.dimension];
         Ok(Body {
             name: names[index].clone(),
             material: material?,
@@ -117,9 +117,9 @@ fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {
         .ok_or_else(|| table.unknown_word("material", &name, &known, table.origin("material")))
 }
 
-fn density(table: &Table<'_>, world: &World<'_>) -> Got<f64> {
+fn density(table: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<f64> {
     let density = finite_sums(table, "density", table.number_if("density")?.unwrap_or(0.0))?;
-    if let Some(kind) = world.analysis.map(|analysis| analysis.kind)
+    if let Some(kind) = earlier.analysis.map(|analysis| analysis.kind)
         && !kind.is_static()
         && density <= 0.0
     {
@@ -129,7 +129,7 @@ fn density(table: &Table<'_>, world: &World<'_>) -> Got<f64> {
     Ok(density)
 }
 
-fn source(body: &Table<'_>, shape: &Table<'_>, world: &World<'_>) -> Got<BodySource> {
+fn source(body: &Table<'_>, shape: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<BodySource> {
     let seeds = ["points_per_cell", "lattice", "gauss"];
     let placed = ["rotate", "translate"];
     if shape.given("points") {
@@ -137,24 +137,24 @@ fn source(body: &Table<'_>, shape: &Table<'_>, world: &World<'_>) -> Got<BodySou
         shape.refuse(&["cells"], "points come from a file; leave one of them out")?;
         shape.refuse(&placed, "points of a file stay where they are")?;
         body.refuse(&seeds, "points come from a file")?;
-        return Ok(BodySource::File(world.directory.join(shape.text("points")?)));
+        return Ok(BodySource::File(earlier.directory.join(shape.text("points")?)));
     }
     if shape.given("cells") {
         shape.refuse(&shapes::FORMS, "cells of the mesh are given; leave one of them out")?;
         shape.refuse(&placed, "cells of the mesh stay where they are")?;
         body.refuse(&["lattice"], "cells of the mesh are filled with points_per_cell or gauss")?;
-        if matches!(world.grid, Grid::Lattice(_)) {
+        if matches!(earlier.grid, Grid::Lattice(_)) {
             return Err(shape.problem("cells", "only for grid.type = \"mesh\""));
         }
         let tag = shape.text("cells")?;
         let tag = (tag != "all").then_some(tag);
-        return Ok(BodySource::MeshCells { tag, seeding: seeding(body, world)? });
+        return Ok(BodySource::MeshCells { tag, seeding: seeding(body, earlier)? });
     }
-    let form = shapes::shape(shape, world.directory, world.dimension, 0);
-    let seeding = seeding(body, world);
+    let form = shapes::shape(shape, earlier.directory, earlier.dimension, 0);
+    let seeding = seeding(body, earlier);
     let form = form?;
-    if let (Some((low, high)), Some((min, max))) = (form.bounds(), grid_bounds(world.grid)) {
-        for axis in 0..world.dimension {
+    if let (Some((low, high)), Some((min, max))) = (form.bounds(), grid_bounds(earlier.grid)) {
+        for axis in 0..earlier.dimension {
             if high[axis] < min[axis] || low[axis] > max[axis] {
                 return Err(shape.problem(
                     "",
@@ -188,8 +188,8 @@ fn grid_bounds(grid: &Grid) -> Option<(Vec<f64>, Vec<f64>)> {
     }
 }
 
-fn seeding(table: &Table<'_>, world: &World<'_>) -> Got<Seeding> {
-    let dimension = world.dimension;
+fn seeding(table: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Seeding> {
+    let dimension = earlier.dimension;
     let given: Vec<&'static str> = ["points_per_cell", "lattice", "gauss"]
         .into_iter()
         .filter(|key| table.given(key))
@@ -207,15 +207,15 @@ fn seeding(table: &Table<'_>, world: &World<'_>) -> Got<Seeding> {
                 let spacing = lattice.number("spacing");
                 let offset = lattice.vector_if("offset", dimension);
                 let (spacing, offset) = (spacing?, offset?);
-                domain_fits(&lattice, spacing, world)?;
+                domain_fits(&lattice, spacing, earlier)?;
                 Ok((spacing, offset.unwrap_or_else(|| vec![0.0; dimension])))
             })?;
             Ok(Seeding::Lattice { spacing, offset })
         }
         _ => {
             let count = table.count("gauss")?;
-            let follows = matches!(world.grid, Grid::Mesh(m) if m.motion == MeshMotion::Material);
-            if !follows || world.method.is_some_and(|method| method.basis != Basis::Mpm) {
+            let follows = matches!(earlier.grid, Grid::Mesh(m) if m.motion == MeshMotion::Material);
+            if !follows || earlier.method.is_some_and(|method| method.basis != Basis::Mpm) {
                 return Err(table.problem(
                     "gauss",
                     "Gauss points are finite elements: they need grid.motion = { follow = \"material\" } and method.basis = \"mpm\"",
@@ -227,8 +227,8 @@ fn seeding(table: &Table<'_>, world: &World<'_>) -> Got<Seeding> {
 }
 
 /// A GIMP domain (as wide as the spacing of its lattice) may not be wider than a cell.
-fn domain_fits(lattice: &Table<'_>, spacing: f64, world: &World<'_>) -> Got<()> {
-    let (Grid::Lattice(grid), Some(method)) = (world.grid, world.method) else { return Ok(()) };
+fn domain_fits(lattice: &Table<'_>, spacing: f64, earlier: &EarlierSections<'_>) -> Got<()> {
+    let (Grid::Lattice(grid), Some(method)) = (earlier.grid, earlier.method) else { return Ok(()) };
     let smallest = grid.spacing.iter().copied().fold(f64::INFINITY, f64::min);
     if method.basis == Basis::Gimp && spacing > smallest * (1.0 + 1e-12) {
         return Err(lattice.problem(

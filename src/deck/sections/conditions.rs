@@ -1,6 +1,6 @@
 //! `[[boundary]]` and `[[load]]`.
 
-use super::bodies::{self, World};
+use super::bodies::{self, EarlierSections};
 use super::{shapes, stages, surfaces};
 use crate::deck::expression::Variable;
 use crate::deck::model::{
@@ -19,7 +19,7 @@ const PENALTY_OF_NITSCHE: f64 = 10.0;
 /// `bodies`: as written; `read`: as read, if that succeeded.
 pub fn boundaries(
     root: &Table<'_>,
-    world: &World<'_>,
+    earlier: &EarlierSections<'_>,
     bodies: &[String],
     read: Option<&[Body]>,
 ) -> Got<Vec<Boundary>> {
@@ -30,14 +30,14 @@ pub fn boundaries(
             return Err(table.problem("name", format!("another boundary is called \"{name}\"")));
         }
         names.push(name.clone());
-        let axes = &AXES[..world.dimension];
+        let axes = &AXES[..earlier.dimension];
         let place = match table.one_of(&["where", "surface"])? {
-            "where" => table.table("where", |t| place(&t, world, bodies)),
-            _ => support(&table, world, bodies, read).map(Place::Surface),
+            "where" => table.table("where", |t| place(&t, earlier, bodies)),
+            _ => support(&table, earlier, bodies, read).map(Place::Surface),
         };
         let fix = table.choices("fix", axes);
         let displacement = table.table_if("displacement", |t| {
-            t.refuse(&AXES[world.dimension..], "the problem is 2D")?;
+            t.refuse(&AXES[earlier.dimension..], "the problem is 2D")?;
             let mut components = Vec::new();
             for (axis, name) in axes.iter().enumerate() {
                 if let Some(value) = t.expression_if(name)? {
@@ -47,14 +47,14 @@ pub fn boundaries(
             Ok(components)
         });
         let rotation = table.table_if("rotation", |t| {
-            let (centre, degrees) = (t.vector_if("centre", world.dimension), t.number("degrees"));
-            let centre = centre?.unwrap_or_else(|| vec![0.0; world.dimension]);
+            let (centre, degrees) = (t.vector_if("centre", earlier.dimension), t.number("degrees"));
+            let centre = centre?.unwrap_or_else(|| vec![0.0; earlier.dimension]);
             Ok(Rotation { centre, degrees: degrees? })
         });
-        let kind = world.analysis.map(|analysis| analysis.kind);
+        let kind = earlier.analysis.map(|analysis| analysis.kind);
         let fades = kind.is_some_and(AnalysisType::is_static);
         let presence = Presence { fades, ..Presence::default() };
-        let presence = stages::presence(&table, world.stages, presence);
+        let presence = stages::presence(&table, earlier.stages, presence);
         let (place, fix, presence) = (place?, fix?, presence?);
         let (displacement, rotation) = (displacement?.unwrap_or_default(), rotation?);
         if let Place::Surface(support) = &place {
@@ -102,11 +102,11 @@ fn checked(table: &Table<'_>, boundary: Boundary) -> Got<Boundary> {
 
 fn support(
     table: &Table<'_>,
-    world: &World<'_>,
+    earlier: &EarlierSections<'_>,
     bodies: &[String],
     read: Option<&[Body]>,
 ) -> Got<Support> {
-    let surface = table.table("surface", |t| surfaces::held(&t, world.dimension, bodies, read));
+    let surface = table.table("surface", |t| surfaces::held(&t, earlier.dimension, bodies, read));
     let (slip, penalty) = (table.flag_if("slip"), table.number_if("penalty"));
     let method = table.choice_if("method")?.unwrap_or(SupportMethod::Penalty);
     let usual = match method {
@@ -121,8 +121,8 @@ fn support(
     })
 }
 
-fn place(table: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got<Place> {
-    let mesh = matches!(world.grid, Grid::Mesh(_));
+fn place(table: &Table<'_>, earlier: &EarlierSections<'_>, bodies: &[String]) -> Got<Place> {
+    let mesh = matches!(earlier.grid, Grid::Mesh(_));
     match table.one_of(&["side", "box", "tag", "cells_of"])? {
         "side" if mesh => Err(table.problem_with_help(
             "side",
@@ -130,11 +130,11 @@ fn place(table: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got<Place> 
             "use where = { tag = \"...\" } or where = { box = { ... } }",
         )),
         "side" => {
-            let side = table.choice_of("side", &SIDES[..2 * world.dimension])?;
+            let side = table.choice_of("side", &SIDES[..2 * earlier.dimension])?;
             Ok(Place::Side { axis: side / 2, upper: side % 2 == 1 })
         }
         "box" => table.table("box", |t| {
-            let (min, max) = shapes::corners(&t, world.dimension, true)?;
+            let (min, max) = shapes::corners(&t, earlier.dimension, true)?;
             Ok(Place::Box { min, max })
         }),
         "tag" if !mesh => Err(table.problem_with_help(
@@ -144,12 +144,12 @@ fn place(table: &Table<'_>, world: &World<'_>, bodies: &[String]) -> Got<Place> 
         )),
         "tag" => {
             let tag = table.text("tag")?;
-            let known: &[&str] = match world.grid {
+            let known: &[&str] = match earlier.grid {
                 Grid::Mesh(MeshGrid { source: MeshSource::Annulus { .. }, .. }) => {
                     &["inner", "outer"]
                 }
                 Grid::Mesh(MeshGrid { source: MeshSource::Box { .. }, .. }) => {
-                    &SIDES[..2 * world.dimension]
+                    &SIDES[..2 * earlier.dimension]
                 }
                 _ => return Ok(Place::Tag(tag)),
             };
@@ -184,11 +184,11 @@ pub(super) fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
 /// The loads and when they act. `read`: the bodies as read, if that succeeded; `names`: as written.
 pub fn loads(
     root: &Table<'_>,
-    world: &World<'_>,
+    earlier: &EarlierSections<'_>,
     names: &[String],
     read: Option<&[Body]>,
 ) -> Got<(Vec<Load>, Vec<Presence>)> {
-    let dimension = world.dimension;
+    let dimension = earlier.dimension;
     let stressed = read.is_some_and(|all| all.iter().any(|body| body.initial_stress.is_some()));
     let all = root.tables("load", |_, table| {
         let load = load(root, &table, dimension, names, read)?;
@@ -198,7 +198,7 @@ pub fn loads(
         // Functions of s or t are taken as they are.
         let once = load.depends_on_time() && table.given("from") && same(&table, "from", "until");
         let presence =
-            stages::presence(&table, world.stages, Presence { fades: !once, ..default })?;
+            stages::presence(&table, earlier.stages, Presence { fades: !once, ..default })?;
         Ok((load, presence))
     })?;
     Ok(all.into_iter().unzip())

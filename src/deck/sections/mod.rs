@@ -72,7 +72,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     // Without the grid the dimension is unknown, and nothing below can be judged.
     let (grid, dimension) = root.table("grid", |table| grid::grid(&table, directory))?;
     let conditioning = analysis::conditioning(&root, analysis.as_ref().ok(), dimension);
-    let world = bodies::World {
+    let earlier = bodies::EarlierSections {
         dimension,
         directory,
         grid: &grid,
@@ -80,10 +80,10 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         method: method.as_ref().ok(),
         stages: &stage_names,
     };
-    let bodies = bodies::bodies(&root, &world);
+    let bodies = bodies::bodies(&root, &earlier);
     let names = bodies::names(&root);
-    let boundaries = conditions::boundaries(&root, &world, &names, bodies.as_deref().ok());
-    let loads = conditions::loads(&root, &world, &names, bodies.as_deref().ok());
+    let boundaries = conditions::boundaries(&root, &earlier, &names, bodies.as_deref().ok());
+    let loads = conditions::loads(&root, &earlier, &names, bodies.as_deref().ok());
     let rigids = contact::rigids(&root, directory, dimension, boundaries.as_deref().ok());
     let contacts = contact::contacts(&root, rigids.as_deref().ok(), &names);
     let verify = results::verify(&root, dimension);

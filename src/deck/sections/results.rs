@@ -1,5 +1,6 @@
 //! `[[verify]]`, `[output]`, `[parallel]`, `[petsc]`.
 
+use crate::deck::choices::Choice;
 use crate::deck::expression::Expression;
 use crate::deck::fields::{self, FieldRank};
 use crate::deck::model::{AnalysisType, Checkpoint, Every, Format, Output, Parallel, Verify};
@@ -7,7 +8,6 @@ use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{self, at_least};
 use crate::deck::tree::Value;
-use crate::deck::words::Words;
 
 pub fn verify(root: &Table<'_>, dimension: usize) -> Got<Vec<Verify>> {
     let mut names: Vec<String> = Vec::new();
@@ -98,7 +98,7 @@ pub fn output(table: &Table<'_>, kind: Option<AnalysisType>) -> Got<Output> {
         }),
         fields,
         checkpoint: checkpoint?,
-        formats: formats?.into_iter().map(|at| Format::WORDS[at].1).collect(),
+        formats: formats?.into_iter().map(|at| Format::SPELLINGS[at].1).collect(),
         report: report?.unwrap_or(true),
     })
 }

@@ -17,7 +17,7 @@ mod version4;
 use rustc_hash::FxHashMap;
 
 pub use kind::Kind;
-use scanner::{Fault, Scanner};
+use scanner::{Scanner, SyntaxError};
 
 /// Nodes, elements and physical groups as the file lists them.
 #[derive(Debug, Default)]
@@ -135,7 +135,7 @@ fn header(scanner: &mut Scanner) -> Result<Version, String> {
 fn physical_names(
     scanner: &mut Scanner,
     names: &mut FxHashMap<(i64, i64), String>,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     let count = scanner.text(|s| s.size())?;
     scanner.line();
     for _ in 0..count {
@@ -150,7 +150,10 @@ fn physical_names(
             Some(((dimension, number), name.to_string()))
         })();
         let (key, name) = parsed.ok_or_else(|| {
-            Fault(format!("a physical name reads as `2 1 \"soil\"`, not as `{}`", line.trim()))
+            SyntaxError(format!(
+                "a physical name reads as `2 1 \"soil\"`, not as `{}`",
+                line.trim()
+            ))
         })?;
         names.insert(key, name);
     }

@@ -4,9 +4,9 @@ use std::fmt;
 
 /// What is wrong at the place where the scanner stands.
 #[derive(Debug)]
-pub(super) struct Fault(pub String);
+pub(super) struct SyntaxError(pub String);
 
-impl fmt::Display for Fault {
+impl fmt::Display for SyntaxError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(&self.0)
     }
@@ -60,11 +60,11 @@ impl<'a> Scanner<'a> {
     }
 
     /// The line that closes a section.
-    pub fn end(&mut self, name: &str) -> Result<(), Fault> {
+    pub fn end(&mut self, name: &str) -> Result<(), SyntaxError> {
         self.skip_blanks();
         let expected = format!("$End{name}");
         if self.at == self.bytes.len() {
-            return Err(Fault(format!("the file ends where {expected} should stand")));
+            return Err(SyntaxError(format!("the file ends where {expected} should stand")));
         }
         // Looked at before it is passed, so that the place named is that of the fault.
         let rest = &self.bytes[self.at..];
@@ -74,15 +74,15 @@ impl<'a> Scanner<'a> {
             self.line();
             return Ok(());
         }
-        Err(Fault(format!("{expected} should stand where {} stands", quoted(line.trim()))))
+        Err(SyntaxError(format!("{expected} should stand where {} stands", quoted(line.trim()))))
     }
 
     /// The file is binary; a four-byte one here tells the order of its bytes.
-    pub fn binary_from_here(&mut self) -> Result<(), Fault> {
+    pub fn binary_from_here(&mut self) -> Result<(), SyntaxError> {
         self.form = match self.take::<4>()? {
             [1, 0, 0, 0] => Form::LittleEndian,
             [0, 0, 0, 1] => Form::BigEndian,
-            _ => return Err(Fault("a one of four bytes should follow the header".into())),
+            _ => return Err(SyntaxError("a one of four bytes should follow the header".into())),
         };
         Ok(())
     }
@@ -105,7 +105,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// A whole number; four bytes in a binary file.
-    pub fn int(&mut self) -> Result<i64, Fault> {
+    pub fn int(&mut self) -> Result<i64, SyntaxError> {
         match self.form {
             Form::Text => self.word("a whole number"),
             Form::LittleEndian => Ok(i64::from(i32::from_le_bytes(self.take()?))),
@@ -114,7 +114,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// A count or a number of a node or element; eight bytes in a binary file.
-    pub fn size(&mut self) -> Result<u64, Fault> {
+    pub fn size(&mut self) -> Result<u64, SyntaxError> {
         match self.form {
             Form::Text => self.word("a whole number from 0"),
             Form::LittleEndian => Ok(u64::from_le_bytes(self.take()?)),
@@ -122,7 +122,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    pub fn real(&mut self) -> Result<f64, Fault> {
+    pub fn real(&mut self) -> Result<f64, SyntaxError> {
         match self.form {
             Form::Text => self.word("a number"),
             Form::LittleEndian => Ok(f64::from_le_bytes(self.take()?)),
@@ -130,7 +130,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    pub fn reals<const N: usize>(&mut self) -> Result<[f64; N], Fault> {
+    pub fn reals<const N: usize>(&mut self) -> Result<[f64; N], SyntaxError> {
         let mut values = [0.0; N];
         for value in &mut values {
             *value = self.real()?;
@@ -139,7 +139,7 @@ impl<'a> Scanner<'a> {
     }
 
     /// Passes over so many whole numbers.
-    pub fn skip_ints(&mut self, count: u64) -> Result<(), Fault> {
+    pub fn skip_ints(&mut self, count: u64) -> Result<(), SyntaxError> {
         (0..count).try_for_each(|_| self.int().map(drop))
     }
 
@@ -158,26 +158,26 @@ impl<'a> Scanner<'a> {
         self.at += rest.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(rest.len());
     }
 
-    fn word<T: std::str::FromStr>(&mut self, expected: &str) -> Result<T, Fault> {
+    fn word<T: std::str::FromStr>(&mut self, expected: &str) -> Result<T, SyntaxError> {
         self.skip_blanks();
         let rest = &self.bytes[self.at..];
         if rest.is_empty() {
-            return Err(Fault(format!("the file ends where {expected} should stand")));
+            return Err(SyntaxError(format!("the file ends where {expected} should stand")));
         }
         let length = rest.iter().position(u8::is_ascii_whitespace).unwrap_or(rest.len());
         let word = std::str::from_utf8(&rest[..length]).ok();
         let value = word.and_then(|word| word.parse().ok()).ok_or_else(|| {
             let found = quoted(&String::from_utf8_lossy(&rest[..length]));
-            Fault(format!("{expected} should stand where {found} stands"))
+            SyntaxError(format!("{expected} should stand where {found} stands"))
         })?;
         self.at += length;
         Ok(value)
     }
 
-    fn take<const N: usize>(&mut self) -> Result<[u8; N], Fault> {
+    fn take<const N: usize>(&mut self) -> Result<[u8; N], SyntaxError> {
         let bytes = self.bytes.get(self.at..self.at + N).and_then(|b| b.try_into().ok());
-        let bytes =
-            bytes.ok_or_else(|| Fault("the file ends where a number should stand".to_string()))?;
+        let bytes = bytes
+            .ok_or_else(|| SyntaxError("the file ends where a number should stand".to_string()))?;
         self.at += N;
         Ok(bytes)
     }

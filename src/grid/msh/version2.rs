@@ -4,7 +4,7 @@ use std::collections::hash_map::Entry;
 
 use rustc_hash::FxHashMap;
 
-use super::scanner::{Fault, Scanner};
+use super::scanner::{Scanner, SyntaxError};
 use super::{Block, Kind};
 
 /// `number x y z`; with parameters then the dimension and number of the geometry and its one or
@@ -13,7 +13,7 @@ pub(super) fn nodes(
     scanner: &mut Scanner,
     parametric: bool,
     nodes: &mut Vec<(u64, [f64; 3])>,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     let count = scanner.text(|s| s.size())?;
     scanner.line();
     nodes.reserve((count as usize).min(scanner.left() / 8));
@@ -33,7 +33,7 @@ pub(super) fn nodes(
 
 /// Text: `number type tags tag.. node..`; binary: runs of elements of one type and number of tags.
 /// The first tag is the physical group, 0 for none.
-pub(super) fn elements(scanner: &mut Scanner, blocks: &mut Vec<Block>) -> Result<(), Fault> {
+pub(super) fn elements(scanner: &mut Scanner, blocks: &mut Vec<Block>) -> Result<(), SyntaxError> {
     let count = scanner.text(|s| s.size())?;
     scanner.line();
     let mut read = 0;
@@ -47,7 +47,9 @@ pub(super) fn elements(scanner: &mut Scanner, blocks: &mut Vec<Block>) -> Result
             (None, kind, scanner.int()?, run)
         };
         if run < 1 || run as u64 > count - read {
-            return Err(Fault(format!("a run of {run} elements does not fit to {count} in all")));
+            return Err(SyntaxError(format!(
+                "a run of {run} elements does not fit to {count} in all"
+            )));
         }
         for _ in 0..run {
             let label = label.map_or_else(|| positive(scanner, "element"), Ok)?;
@@ -65,9 +67,10 @@ pub(super) fn elements(scanner: &mut Scanner, blocks: &mut Vec<Block>) -> Result
     Ok(())
 }
 
-fn positive(scanner: &mut Scanner, what: &str) -> Result<u64, Fault> {
+fn positive(scanner: &mut Scanner, what: &str) -> Result<u64, SyntaxError> {
     let number = scanner.int()?;
-    u64::try_from(number).map_err(|_| Fault(format!("a {what} cannot have the number {number}")))
+    u64::try_from(number)
+        .map_err(|_| SyntaxError(format!("a {what} cannot have the number {number}")))
 }
 
 /// An element of several physical groups is listed once for each of them, under numbers of its own.

@@ -2,7 +2,7 @@
 
 use rustc_hash::FxHashMap;
 
-use super::scanner::{Fault, Scanner};
+use super::scanner::{Scanner, SyntaxError};
 use super::{Block, Kind, Version};
 
 /// Physical groups of each entity (dimension, number).
@@ -14,7 +14,7 @@ pub(super) fn entities(
     scanner: &mut Scanner,
     version: Version,
     groups: &mut Groups,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     let counts = [scanner.size()?, scanner.size()?, scanner.size()?, scanner.size()?];
     for (dimension, count) in counts.into_iter().enumerate() {
         for _ in 0..count {
@@ -31,7 +31,7 @@ pub(super) fn partitioned_entities(
     scanner: &mut Scanner,
     version: Version,
     groups: &mut Groups,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     scanner.size()?;
     let ghosts = scanner.size()?;
     scanner.skip_ints(2 * ghosts)?;
@@ -54,7 +54,7 @@ fn entity(
     dimension: i64,
     number: i64,
     groups: &mut Groups,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     if dimension == 0 && version == Version::V41 {
         scanner.reals::<3>()?;
     } else {
@@ -75,7 +75,7 @@ fn entity(
 }
 
 /// Dimension and number of a block's entity: 4.0 has them the other way round.
-fn block_entity(scanner: &mut Scanner, version: Version) -> Result<(i64, i64), Fault> {
+fn block_entity(scanner: &mut Scanner, version: Version) -> Result<(i64, i64), SyntaxError> {
     let (a, b) = (scanner.int()?, scanner.int()?);
     Ok(if version == Version::V40 { (b, a) } else { (a, b) })
 }
@@ -86,7 +86,7 @@ pub(super) fn nodes(
     scanner: &mut Scanner,
     version: Version,
     nodes: &mut Vec<(u64, [f64; 3])>,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     let blocks = scanner.size()?;
     let all = scanner.size()?;
     if version == Version::V41 {
@@ -116,7 +116,7 @@ pub(super) fn nodes(
         }
     }
     if nodes.len() as u64 != all {
-        return Err(Fault(format!(
+        return Err(SyntaxError(format!(
             "{all} nodes are announced, and {} of them are there",
             nodes.len()
         )));
@@ -130,7 +130,7 @@ pub(super) fn elements(
     version: Version,
     groups: &Groups,
     blocks: &mut Vec<Block>,
-) -> Result<(), Fault> {
+) -> Result<(), SyntaxError> {
     let count = scanner.size()?;
     scanner.size()?;
     if version == Version::V41 {
@@ -160,8 +160,8 @@ pub(super) fn elements(
 }
 
 /// The type of an element.
-pub(super) fn kind(scanner: &mut Scanner) -> Result<Kind, Fault> {
+pub(super) fn kind(scanner: &mut Scanner) -> Result<Kind, SyntaxError> {
     let number = scanner.int()?;
     Kind::from_number(number)
-        .ok_or_else(|| Fault(format!("no element type has the number {number}")))
+        .ok_or_else(|| SyntaxError(format!("no element type has the number {number}")))
 }

@@ -84,21 +84,21 @@ impl Curves {
     }
 
     /// Places of a line; with a logarithmic axis powers of ten.
-    fn places(&self, values: &[f64]) -> Vec<(f64, f64)> {
+    fn coordinates(&self, values: &[f64]) -> Vec<(f64, f64)> {
         let scaled = |y: f64| if self.logarithmic { y.log10() } else { y };
         let pairs = self.x.1.iter().zip(values).map(|(&x, &y)| (x, scaled(y)));
         pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
     }
 }
 
-/// Ends with a little room; a width where all are equal.
+/// Ends with a little margin; a width where all are equal.
 fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
     if low > high {
         return (0.0, 1.0);
     }
-    let room = if high > low { 0.03 * (high - low) } else { low.abs().max(1.0) * 0.1 };
-    (low - room, high + room)
+    let margin = if high > low { 0.03 * (high - low) } else { low.abs().max(1.0) * 0.1 };
+    (low - margin, high + margin)
 }
 
 impl Drawing for Curves {
@@ -113,9 +113,9 @@ impl Drawing for Curves {
         let said = |error: DrawingAreaErrorKind<B::ErrorType>| error.to_string();
         area.fill(&WHITE).map_err(said)?;
         let all: Vec<Vec<(f64, f64)>> =
-            self.lines.iter().map(|(_, values)| self.places(values)).collect();
-        let places = || all.iter().flatten();
-        let (x, y) = (ends(places().map(|p| p.0)), ends(places().map(|p| p.1)));
+            self.lines.iter().map(|(_, values)| self.coordinates(values)).collect();
+        let coordinates = || all.iter().flatten();
+        let (x, y) = (ends(coordinates().map(|p| p.0)), ends(coordinates().map(|p| p.1)));
         let mut chart = ChartBuilder::on(area)
             .caption(&self.caption, ("sans-serif", LETTERS + 2))
             .x_label_area_size(56)
@@ -143,9 +143,9 @@ impl Drawing for Curves {
             .axis_desc_style(("sans-serif", LETTERS - 2))
             .draw()
             .map_err(said)?;
-        for (k, ((name, _), places)) in self.lines.iter().zip(all).enumerate() {
+        for (k, ((name, _), coordinates)) in self.lines.iter().zip(all).enumerate() {
             let style = COLOURS[k % COLOURS.len()].stroke_width(2);
-            let series = chart.draw_series(LineSeries::new(places, style)).map_err(said)?;
+            let series = chart.draw_series(LineSeries::new(coordinates, style)).map_err(said)?;
             if self.lines.len() > 1 {
                 series
                     .label(name)

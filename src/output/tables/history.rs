@@ -9,7 +9,7 @@ use crate::output::terminal::log::Log;
 
 /// What a run's history holds besides the columns that every run has.
 #[derive(Debug, Clone, Default)]
-pub struct Layout {
+pub struct HistoryColumns {
     /// 2 or 3: plane strain has its forces, energies and momenta per metre of thickness.
     pub dimension: usize,
     /// Two dimensions stand for a whole body, not for a slice of it: axisymmetry.
@@ -68,13 +68,13 @@ pub struct HistoryRow {
     pub momentum: [f64; 3],
     /// About the origin.
     pub angular_momentum: [f64; 3],
-    /// One per entry of [`Layout::boundaries`].
+    /// One per entry of [`HistoryColumns::boundaries`].
     pub reactions: Vec<Reaction>,
-    /// One per entry of [`Layout::rigids`]: what it exerts; it holds nothing.
+    /// One per entry of [`HistoryColumns::rigids`]: what it exerts; it holds nothing.
     pub rigids: Vec<Reaction>,
-    /// One per entry of [`Layout::free`].
+    /// One per entry of [`HistoryColumns::free`].
     pub free: Vec<FreeState>,
-    /// One per entry of [`Layout::contacts`].
+    /// One per entry of [`HistoryColumns::contacts`].
     pub contacts: Vec<ContactState>,
     /// In the penalties of contacts.
     pub energy_contact: f64,
@@ -90,7 +90,7 @@ pub struct HistoryRow {
     pub moved_points: f64,
     /// s since the start of the run.
     pub wall_seconds: f64,
-    /// For [`Layout::conditioning`].
+    /// For [`HistoryColumns::conditioning`].
     pub conditioning: Conditioning,
 }
 
@@ -145,7 +145,7 @@ pub struct Conditioning {
 }
 
 /// Name, unit and value of every column: the one place where they are paired.
-fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
+fn cells(layout: &HistoryColumns, row: &HistoryRow) -> Vec<(Column, f64)> {
     let plane = layout.dimension == 2 && !layout.whole;
     let unit = |volume, area| if plane { area } else { volume };
     let (force, energy) = (unit("N", "N/m"), unit("J", "J/m"));
@@ -248,13 +248,13 @@ fn cells(layout: &Layout, row: &HistoryRow) -> Vec<(Column, f64)> {
 /// The open history of a run.
 #[derive(Debug)]
 pub struct History {
-    layout: Layout,
+    layout: HistoryColumns,
     pub table: CsvTable,
 }
 
 impl History {
     /// A new history. Nothing is written before [`CsvTable::open`].
-    pub fn create(directory: &ResultsDirectory, layout: Layout) -> Result<Self> {
+    pub fn create(directory: &ResultsDirectory, layout: HistoryColumns) -> Result<Self> {
         let table = CsvTable::create(&directory.file(HISTORY), &header(&layout))?;
         Ok(Self { layout, table })
     }
@@ -262,7 +262,7 @@ impl History {
     /// Continues the history of a run up to `mark`: [`CsvTable::resume`].
     pub fn resume(
         directory: &ResultsDirectory,
-        layout: Layout,
+        layout: HistoryColumns,
         mark: Mark,
         log: &mut Log,
         comm: &SimpleCommunicator,
@@ -280,7 +280,7 @@ impl History {
     }
 }
 
-fn header(layout: &Layout) -> Vec<String> {
+fn header(layout: &HistoryColumns) -> Vec<String> {
     cells(layout, &HistoryRow::default())
         .into_iter()
         .map(|(column, _)| format!("{} [{}]", column.name, column.unit))
@@ -293,7 +293,11 @@ mod tests {
 
     #[test]
     fn the_columns_of_a_plane_strain_run() {
-        let layout = Layout { dimension: 2, boundaries: vec!["root".into()], ..Layout::default() };
+        let layout = HistoryColumns {
+            dimension: 2,
+            boundaries: vec!["root".into()],
+            ..HistoryColumns::default()
+        };
         assert_eq!(
             header(&layout).join(","),
             "step [-],load_factor [-],time [s],dt [s],newton_iterations [-],residual [-],\
@@ -309,7 +313,7 @@ mod tests {
 
     #[test]
     fn values_stand_under_their_names() {
-        let layout = Layout {
+        let layout = HistoryColumns {
             dimension: 3,
             whole: false,
             boundaries: vec!["a".into(), "b".into()],

@@ -10,7 +10,7 @@ use crate::system::populated::Populated;
 
 /// Label of the piece at each local node: the smallest grid node of that piece on any rank.
 /// `numbering` holds the nodes of the populated cells and the faces owned here. Pieces are joined
-/// on each rank; then labels pass between neighbours until they settle. Collective.
+/// on each rank; then labels pass between neighbours until none changes. Collective.
 pub fn labels<const D: usize>(
     world: &World,
     grid: &Grid<D>,

@@ -140,7 +140,7 @@ fn loose<const D: usize>(
     let with_ties;
     let numbering = if grid.element().is_simplex() {
         let nodes = numbering.nodes.iter().chain(faces.iter().flat_map(|face| &face.nodes));
-        let nodes = Touched::settle(world, grid, partition, nodes.copied().collect())?;
+        let nodes = Touched::assign(world, grid, partition, nodes.copied().collect())?;
         with_ties = Numbering::build(world, nodes.owned, &nodes.foreign)?;
         &with_ties
     } else {

@@ -11,7 +11,7 @@ pub(super) fn add_block<const D: usize, R: BlockRows<D>>(
     block: &[f64],
     rows: &mut R,
 ) {
-    let (place, count) = (pattern.places.of(group), nodes.len());
+    let (place, count) = (pattern.support_columns.of(group), nodes.len());
     let runs = count / place.run;
     for (a, &node) in nodes.iter().enumerate() {
         let row = pattern.row_of[node as usize] as usize;

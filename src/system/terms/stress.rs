@@ -263,7 +263,11 @@ impl<const D: usize> Task<'_, D> {
     ) {
         let Some(matrix) = stiffness else { return };
         if !work.batch.is_empty() {
-            work.batch.flush::<D, FUSED, R>(self.pattern.places.of(group), &work.rows, matrix);
+            work.batch.flush::<D, FUSED, R>(
+                self.pattern.support_columns.of(group),
+                &work.rows,
+                matrix,
+            );
         }
     }
 

@@ -7,15 +7,15 @@ use super::model::{
 };
 
 /// An enumeration that the deck spells in words.
-pub trait Words: Copy + PartialEq + 'static {
+pub trait Choice: Copy + PartialEq + 'static {
     /// Every word with its value, in the order of the documentation.
-    const WORDS: &'static [(&'static str, Self)];
+    const SPELLINGS: &'static [(&'static str, Self)];
 }
 
-macro_rules! words {
+macro_rules! choices {
     ($( $type:ident { $( $word:literal => $variant:ident ),* $(,)? } )*) => { $(
-        impl Words for $type {
-            const WORDS: &'static [(&'static str, Self)] = &[ $( ($word, $type::$variant) ),* ];
+        impl Choice for $type {
+            const SPELLINGS: &'static [(&'static str, Self)] = &[ $( ($word, $type::$variant) ),* ];
         }
 
         impl $type {
@@ -30,7 +30,7 @@ macro_rules! words {
     )* };
 }
 
-words! {
+choices! {
     AnalysisType {
         "quasi-static" => QuasiStatic,
         "explicit" => Explicit,

@@ -7,9 +7,9 @@ use crate::petsc::Index;
 
 use super::graph::Lists;
 
-/// Places of all supports of a pattern.
+/// Columns of all supports of a pattern.
 #[derive(Debug, Clone, Default)]
-pub struct Places {
+pub struct SupportColumns {
     /// Nodes per run of each support, all of its runs alike: 1, 2 or 3.
     runs: Vec<u8>,
     /// First position of each support.
@@ -18,16 +18,16 @@ pub struct Places {
     positions: Vec<u16>,
 }
 
-/// Places of one support.
+/// Columns of one support.
 #[derive(Clone, Copy)]
-pub struct Place<'a> {
+pub struct ColumnRuns<'a> {
     /// Nodes per run.
     pub run: usize,
-    /// See [`Places`].
+    /// See [`SupportColumns`].
     pub positions: &'a [u16],
 }
 
-impl Places {
+impl SupportColumns {
     /// `supports`: local nodes of each support; `touched`: the local nodes that have rows, each
     /// with its row and the supports that hold it; `rows`: local nodes of each row, ascending by
     /// equation number `global`.
@@ -38,7 +38,7 @@ impl Places {
         global: &[Index],
     ) -> Result<Self> {
         let count = supports.len();
-        let mut places = Places {
+        let mut found = SupportColumns {
             runs: Vec::with_capacity(count),
             starts: Vec::with_capacity(count + 1),
             positions: Vec::new(),
@@ -47,12 +47,12 @@ impl Places {
         for s in 0..count {
             let nodes = supports.list(s);
             let run = run_length(nodes, global);
-            places.runs.push(run as u8);
-            places.starts.push(total);
+            found.runs.push(run as u8);
+            found.starts.push(total);
             total += nodes.len() * (nodes.len() / run);
         }
-        places.starts.push(total);
-        places.positions = vec![0; total];
+        found.starts.push(total);
+        found.positions = vec![0; total];
 
         let mut position_of = vec![0u16; global.len()];
         let mut seen = vec![0u16; count];
@@ -70,7 +70,7 @@ impl Places {
             for &s in holders {
                 let s = s as usize;
                 let nodes = supports.list(s);
-                let run = usize::from(places.runs[s]);
+                let run = usize::from(found.runs[s]);
                 // Rows mostly come in the order of the support's nodes.
                 let next = usize::from(seen[s]);
                 let a = match nodes.get(next) == Some(&local) {
@@ -79,14 +79,14 @@ impl Places {
                 };
                 seen[s] = a as u16 + 1;
                 let width = nodes.len() / run;
-                let start = places.starts[s] + a * width;
-                let target = &mut places.positions[start..start + width];
+                let start = found.starts[s] + a * width;
+                let target = &mut found.positions[start..start + width];
                 for (place, node) in target.iter_mut().zip(nodes.iter().step_by(run)) {
                     *place = position_of[*node as usize];
                 }
             }
         }
-        Ok(places)
+        Ok(found)
     }
 
     /// Stored positions.
@@ -99,8 +99,8 @@ impl Places {
     }
 
     #[inline]
-    pub fn of(&self, support: usize) -> Place<'_> {
-        Place {
+    pub fn of(&self, support: usize) -> ColumnRuns<'_> {
+        ColumnRuns {
             run: usize::from(self.runs[support]),
             positions: &self.positions[self.starts[support]..self.starts[support + 1]],
         }
