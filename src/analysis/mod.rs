@@ -14,7 +14,7 @@
 //! | load steps, cut and grown again | `load_steps.rs` | |
 //! | time steps and their stability limit | `time_steps.rs` | Ghost §3.5 |
 //! | Newton's method for a step | `newton.rs`, `convergence.rs` | Lagrangian eq. 26-30, 40 |
-//! | the equations that it solves | `equilibrium.rs` | Lagrangian eq. 26-30 |
+//! | the equations that it solves | `equilibrium/` | Lagrangian eq. 26-30 |
 //! | default linear solvers | `solver.rs` | |
 //! | a step that ends a run, in words | `failure.rs` | |
 

@@ -12,7 +12,7 @@
 //! | `marks.rs` | the text of a deck, and how a message points into it |
 //! | `places.rs` | where each key is written, for faults seen later |
 //! | `sections/` | each section's values and the checks across sections |
-//! | `resolved.rs` | the deck with every default, as TOML |
+//! | `resolved/` | the deck with every default, as TOML |
 //! | `physics.rs` | the part that a continued run must share |
 //! | `reference.rs`, `json_schema.rs` | the schema as documentation, and as JSON Schema |
 //! | `list.rs`, `explain.rs` | `--list`, `--explain` |

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | world, model, points, recorder and clock of a run | `context.rs` | |
 //! | a finished step | `step.rs` | |
-//! | rows, frames, summary | `recorder.rs` | |
+//! | rows, frames, summary | `recorder/` | |
 //! | energies and momenta | `ledger.rs` | Ghost §5.2 |
 //! | forces on the boundaries | `reactions.rs` | Rotation Figure 7 |
 //! | forces and states of contacts | `contact.rs` | formulations.md B.5 |

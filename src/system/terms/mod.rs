@@ -1,5 +1,5 @@
 //! Contributions to a step's equations. A new one is a file that implements [`Term`] and a line
-//! where `analysis/equilibrium.rs` lists the terms of a step.
+//! where `analysis/equilibrium/mod.rs` lists the terms of a step.
 //!
 //! | term | file | source |
 //! |---|---|---|

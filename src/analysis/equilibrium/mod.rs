@@ -4,18 +4,14 @@
 //! zero in each step, and the error is |f_ext - f_int + f_react| / |f_ext + f_react| over all
 //! degrees of freedom (Lagrangian eq. 40). Iteration 0 evaluates at zero displacement.
 
-use std::time::Instant;
+mod error;
+mod iteration;
 
-use crate::amg;
-use crate::amg::level::Assembled;
-use crate::amg::symmetric_part::symmetric_part;
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
-use crate::petsc::snes::{NewtonProblem, Verdict};
-use crate::petsc::{BlockProduct, Hierarchy};
 use crate::points::Points;
 use crate::system::conditions::Conditions;
 use crate::system::held::Held;
@@ -23,15 +19,13 @@ use crate::system::in_place::{InPlace, RowAddresses};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
+use crate::system::step_system::Discretisation;
 use crate::system::terms::Term;
 use crate::system::terms::following::Following;
 use crate::system::terms::ghost::Ghost;
 use crate::system::terms::stress::{StepPoints, Stress};
 use crate::system::terms::term::{At, Health, Part};
-
-use super::convergence::{converges_next, hardly_falls};
-use super::round_off;
-use crate::system::step_system::Discretisation;
+use std::time::Instant;
 
 /// Limits and choices of the iteration.
 #[derive(Debug, Clone, Copy)]
@@ -218,16 +212,6 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self.following.as_ref().map_or(&[], |followed| &followed.force)
     }
 
-    /// Acts on the matrix as multigrid reads it.
-    fn with_rows<T>(
-        &self,
-        matrix: &mut Matrix,
-        act: impl FnOnce(&Assembled) -> Result<T>,
-    ) -> Result<T> {
-        let (own, other) = matrix.storage()?;
-        act(&Assembled::new(self.numbering, self.pattern, &own, other.as_deref().unwrap_or(&[])))
-    }
-
     pub fn settings(&self) -> &NewtonSettings {
         &self.settings
     }
@@ -394,197 +378,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         }
         Ok(usable)
     }
-
-    /// Whether the coming iterate will hardly need a tangent.
-    fn expects_convergence(&self) -> bool {
-        converges_next(&self.errors, self.settings.tolerance)
-    }
-
-    /// Whether the residual is at the round-off of the terms it is the sum of, everywhere: no better
-    /// solver or smaller step would bring it down ([`round_off`]). Collective.
-    fn is_round_off(&self) -> Result<bool> {
-        // Sizes take a pass over the points. A residual far above those of strains and moves of a
-        // whole cell in the stiffest place needs none.
-        let (cell, count) = (self.grid.cell_size(), (self.numbering.total * D) as f64);
-        let largest = self.diagonal_largest * cell * count.sqrt() + self.actions_norm;
-        let moves = self.world.max(self.displacement.iter().fold(0.0, |m, u| u.abs().max(m)));
-        // The iterate of a singular system may be of any size, and its terms with it.
-        if moves > FARTHEST * cell {
-            return Ok(false);
-        }
-        if !round_off::explains(largest * (1.0 + moves / cell), self.residual_norm) {
-            return Ok(false);
-        }
-        let (numbering, pattern) = (self.numbering, self.pattern);
-        let mut size = vec![0.0; numbering.len()];
-        for term in &self.terms {
-            term.add_share_sizes(self.at(), &mut size);
-        }
-        numbering.halo.reverse_add(self.world, &mut size, 1)?;
-        size.truncate(numbering.owned);
-        let norm = |u: &[f64]| u.iter().map(|u| u * u).sum::<f64>().sqrt();
-        let moved: Vec<f64> = self.displacement.chunks_exact(D).map(norm).collect();
-        for term in &self.terms {
-            term.add_sizes(pattern, &moved, &mut size);
-        }
-        let explained = self.counted().all(|dof| {
-            let action = self.external_owned[dof] + self.reaction_owned[dof];
-            let size = size[dof / D] + self.external_owned[dof].abs() + action.abs();
-            round_off::explains(size, action - self.internal_owned[dof])
-        });
-        Ok(!self.world.any(!explained))
-    }
-
-    /// f_react = f_int(old) + K (x - x_old) - f_ext on the fixed degrees of freedom.
-    fn accumulate_reactions(&mut self, x: &[f64]) -> Result<()> {
-        let mut change = vec![0.0; self.numbering.len() * D];
-        for (c, (new, old)) in change.iter_mut().zip(x.iter().zip(&self.previous_owned)) {
-            *c = new - old;
-        }
-        self.numbering.halo.forward(self.world, &mut change, D)?;
-        for (dof, sum) in self.held.reactions::<D>(self.pattern, &change) {
-            self.reaction_owned[dof] =
-                self.internal_previous[dof] + sum - self.external_previous[dof];
-        }
-        Ok(())
-    }
-
-    /// Owned degrees of freedom but those left out, which carry no equation.
-    fn counted(&self) -> impl Iterator<Item = usize> {
-        let mut next_fixed = self.held.fixed().peekable();
-        (0..self.external_owned.len()).filter(move |&dof| {
-            let fixed = next_fixed.next_if_eq(&dof).is_some();
-            fixed || !self.held.holds(dof)
-        })
-    }
-
-    /// Lagrangian eq. 40; 1 where a residual stands against no action at all, 0 where there is
-    /// neither.
-    fn normalised_error(&mut self) -> f64 {
-        let (mut residual, mut actions) = (0.0, 0.0);
-        for dof in self.counted() {
-            let action = self.external_owned[dof] + self.reaction_owned[dof];
-            residual += (action - self.internal_owned[dof]).powi(2);
-            actions += action * action;
-        }
-        actions += self.terms.iter().map(|term| term.squared_actions(self.at())).sum::<f64>();
-        let sums = self.world.sum_slice(&[residual, actions]);
-        (self.residual_norm, self.actions_norm) = (sums[0].sqrt(), sums[1].sqrt());
-        match (self.residual_norm, self.actions_norm) {
-            (0.0, 0.0) => 0.0,
-            (residual, 0.0) if residual.is_finite() => 1.0,
-            (residual, actions) => residual / actions,
-        }
-    }
 }
-
-impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
-    /// With the tangent, unless this is likely the step's last evaluation.
-    fn residual(&mut self, x: &[f64], f: &mut [f64], matrix: &mut Matrix) -> Result<bool> {
-        let matrix = (!self.expects_convergence()).then_some(matrix);
-        self.evaluate_at(x, f, matrix)
-    }
-
-    fn jacobian(&mut self, _x: &[f64], matrix: &mut Matrix) -> Result<()> {
-        if self.tangent == Tangent::Stale {
-            let begin = Instant::now();
-            self.evaluate(Some(matrix))?;
-            self.assembly_seconds += begin.elapsed().as_secs_f64();
-        }
-        if self.tangent == Tangent::Assembled {
-            let (mut main, mut other) = matrix.storage()?;
-            let mut rows = InPlace::filled(&self.addresses, &mut main, &mut self.beside)?;
-            let scale = self.diagonal_scale;
-            self.held.constrain(self.pattern, scale, &mut rows);
-            if let Some(other) = &mut other {
-                rows.hand_over(other)?;
-            }
-            self.tangent = Tangent::Constrained;
-        }
-        matrix.changed()
-    }
-
-    /// Moves the columns of prescribed displacements to the right-hand side.
-    fn before_solve(&mut self, rhs: &mut [f64]) -> Result<()> {
-        let mut prescribed = vec![0.0; self.numbering.len() * D];
-        let mut any = false;
-        for (dof, value) in rhs.iter().enumerate() {
-            if self.held.holds(dof) && *value != 0.0 {
-                prescribed[dof] = value / self.diagonal_scale;
-                any = true;
-            }
-        }
-        if !self.world.any(any) {
-            return Ok(());
-        }
-        self.numbering.halo.forward(self.world, &mut prescribed, D)?;
-        self.held.move_columns(&prescribed, rhs);
-        Ok(())
-    }
-
-    fn assess(&mut self, iteration: usize, x: &[f64], _f: &[f64]) -> Result<Verdict> {
-        if iteration > 0 {
-            self.accumulate_reactions(x)?;
-        } else {
-            self.internal_start.clone_from(&self.internal_owned);
-        }
-        let error = self.normalised_error();
-        self.errors.push(error);
-        self.previous_owned.copy_from_slice(x);
-        self.internal_previous.copy_from_slice(&self.internal_owned);
-        self.external_previous.copy_from_slice(&self.external_owned);
-        let last = iteration + 1 >= self.settings.max_evaluations;
-        Ok(if !error.is_finite() {
-            Verdict::Diverged("the residual is not finite".into())
-        } else if iteration > 0 && error <= self.settings.tolerance {
-            Verdict::Converged
-        } else if iteration > 0 && (hardly_falls(&self.errors) || last) && self.is_round_off()? {
-            self.at_round_off = true;
-            Verdict::Converged
-        } else if last {
-            Verdict::Diverged(format!(
-                "residual {error:.3e} after {} evaluations, tolerance {:.1e}",
-                iteration + 1,
-                self.settings.tolerance
-            ))
-        } else {
-            Verdict::Continue
-        })
-    }
-
-    fn error_over_tolerance(&self) -> f64 {
-        self.errors.last().map_or(f64::INFINITY, |error| error / self.settings.tolerance)
-    }
-
-    fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
-        self.with_rows(matrix, |rows| {
-            let symmetric = self.symmetric();
-            amg::of_system(self.world, self.grid, self.numbering, rows, symmetric)
-        })
-    }
-
-    fn fill(
-        &mut self,
-        matrix: &mut Matrix,
-        exact: &mut BlockProduct<f64>,
-        finest: &mut BlockProduct<f32>,
-    ) -> Result<()> {
-        self.with_rows(matrix, |rows| {
-            amg::fill::<_, D>(rows, exact);
-            if self.symmetric() {
-                exact.round_into(finest);
-                return Ok(());
-            }
-            let (world, of) = (self.world, self.numbering);
-            let part = symmetric_part(world, of.owned, &of.global, &of.halo, rows)?;
-            amg::fill::<_, D>(&part, finest);
-            Ok(())
-        })
-    }
-}
-
-/// Cells that a node may move in a step for the residual to be judged by the size of its terms.
-const FARTHEST: f64 = 1e3;
 
 /// Mean and largest size of the free diagonal entries over all ranks; 1 where there are none.
 /// Collective.
