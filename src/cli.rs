@@ -161,7 +161,7 @@ pub struct Plot {
     /// The table of the curves: history, probes, residuals, element
     #[arg(long, value_name = "TABLE", default_value = "history")]
     pub table: String,
-    /// Column across (default: time, or load_factor, or step)
+    /// Column across (default: the first of time, load_factor and step that grows from row to row)
     #[arg(long, value_name = "NAME")]
     pub x: Option<String>,
     /// A logarithmic vertical axis

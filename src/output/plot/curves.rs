@@ -32,7 +32,8 @@ pub struct Curves {
 
 impl Curves {
     /// Columns of a csv table whose header is `name [unit]`, by their names. `x`: `None` for the
-    /// time, the load factor or the step, whichever changes first.
+    /// time, the load factor or the step: the first that grows from row to row (the load factor begins
+    /// anew in each stage).
     ///
     /// # Errors
     /// `Input` for a column that is not there.
@@ -69,9 +70,8 @@ impl Curves {
             Some(name) => column(name)?,
             None => {
                 let usual = ["time", "load_factor", "step"];
-                let known = usual.iter().filter_map(|name| column(name).ok());
-                let mut changing = known.filter(|(_, values)| values.iter().any(|v| *v != 0.0));
-                changing.next().map_or_else(|| column("step"), Ok)?
+                let mut known = usual.iter().filter_map(|name| column(name).ok());
+                known.find(|(_, values)| grows(values)).map_or_else(|| column("step"), Ok)?
             }
         };
         let lines = names.iter().map(|name| column(name)).collect::<Result<Vec<_>>>()?;
@@ -89,6 +89,11 @@ impl Curves {
         let pairs = self.x.1.iter().zip(values).map(|(&x, &y)| (x, scaled(y)));
         pairs.filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
     }
+}
+
+/// Never falls, and is not zero throughout.
+fn grows(values: &[f64]) -> bool {
+    values.iter().any(|v| *v != 0.0) && values.windows(2).all(|pair| pair[0] <= pair[1])
 }
 
 /// Ends with a little margin; a width where all are equal.
@@ -163,5 +168,27 @@ impl Drawing for Curves {
                 .map_err(said)?;
         }
         area.present().map_err(said)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grows_is_drawn_across() {
+        let across = |text: &str| {
+            let curves = Curves::of_table(text, &["y".into()], None, false, None).unwrap();
+            curves.x.0
+        };
+        assert_eq!(
+            across("step [-],load_factor [-],time [s],y [m]\n1,0.5,0,3\n2,1,0,4\n"),
+            "load_factor"
+        );
+        assert_eq!(across("step [-],load_factor [-],time [s],y [m]\n1,1,0,3\n2,0.5,0,4\n"), "step");
+        assert_eq!(
+            across("step [-],load_factor [-],time [s],y [m]\n1,1,2,3\n2,1,3,4\n"),
+            "time [s]"
+        );
     }
 }

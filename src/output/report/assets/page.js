@@ -114,12 +114,10 @@
     return k < 0 ? null : { name: table.header[k], values: table.columns[k] };
   };
   const changes = (c) => c && c.values.some((v) => v !== null && v !== 0);
-  const across = (table) => {
-    const time = column(table, "time");
-    if (changes(time)) return time;
-    const factor = column(table, "load_factor");
-    return changes(factor) ? factor : column(table, "step");
-  };
+  // The load factor begins anew in each stage.
+  const grows = (c) => changes(c) && c.values.every((v, k) => k === 0 || v >= c.values[k - 1]);
+  const across = (table) =>
+    ["time", "load_factor"].map((name) => column(table, name)).find(grows) || column(table, "step");
   const host = $("curves");
   const group = (caption, table, wanted, options) => {
     const ys = table.header.map((title, k) => ({ name: title, values: table.columns[k] }))
