@@ -8,7 +8,15 @@ use std::env;
 use std::path::PathBuf;
 
 const PETSC_NAMES: [&str; 2] = ["petsc", "PETSc"];
-const PETSC_VERSIONS: (&str, &str) = ("3.18", "3.19");
+/// The first that serves, and the first that nobody has tried.
+const PETSC_VERSIONS: (&str, &str) = ("3.18", "3.27");
+/// Differences between versions of PETSc, read off the bindings: the flag that `src/petsc/sys.rs` asks
+/// for, the beginning of a declaration, and what stands in it where the flag is set.
+const DIFFERENCES: [(&str, &str, &str); 3] = [
+    ("petsc_bool", "pub type PetscBool ", "bool"),
+    ("petsc_any_function_returns", "pub fn MatShellSetOperation(", "PetscErrorCodeFn"),
+    ("petsc_destroys_by_place", "pub fn MatShellSetContextDestroy(", "PetscCtxDestroyFn"),
+];
 
 fn main() {
     println!("cargo:rerun-if-changed=ffi/petsc.h");
@@ -24,14 +32,13 @@ fn main() {
         })
         .unwrap_or_else(|| match other_petsc() {
             Some((name, version)) => panic!(
-                "\nPETSc {version} was found (pkg-config module `{name}`), and PETSc {}.x is needed, \
-                 with real scalars.\n  try: Debian 12, whose libpetsc-real-dev has \
-                 it; or build PETSc {} from https://petsc.org and put the folder of its PETSc.pc into \
-                 PKG_CONFIG_PATH\n",
-                PETSC_VERSIONS.0, PETSC_VERSIONS.0
+                "\nPETSc {version} was found (pkg-config module `{name}`), and one from {} to below {} is \
+                 needed, with real scalars.\n  try: libpetsc-real-dev of Debian 12 or 13; or build PETSc \
+                 from https://petsc.org and put the folder of its PETSc.pc into PKG_CONFIG_PATH\n",
+                PETSC_VERSIONS.0, PETSC_VERSIONS.1
             ),
             None => missing(
-                "PETSc (real scalars, 3.18.x)",
+                "PETSc (real scalars, 3.18 to 3.26)",
                 "libpetsc-real-dev",
                 "pkg-config modules `petsc` and `PETSc`; set PKG_CONFIG_PATH to add a folder",
             ),
@@ -80,6 +87,14 @@ fn main() {
     let bindings = builder
         .generate()
         .unwrap_or_else(|error| panic!("bindgen could not read ffi/petsc.h: {error}"));
+    let text = bindings.to_string();
+    for (flag, declaration, word) in DIFFERENCES {
+        println!("cargo:rustc-check-cfg=cfg({flag})");
+        let declared = text.find(declaration).map(|at| &text[at..]).unwrap_or_default();
+        if declared.split(';').next().is_some_and(|declared| declared.contains(word)) {
+            println!("cargo:rustc-cfg={flag}");
+        }
+    }
     let out = PathBuf::from(env::var("OUT_DIR").expect("cargo sets OUT_DIR")).join("petsc.rs");
     bindings
         .write_to_file(&out)

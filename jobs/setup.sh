@@ -18,8 +18,8 @@ fail() {
 command -v cargo >/dev/null 2>&1 ||
     fail "cargo is missing: install Rust 1.89 or newer from https://rustup.rs, then repeat"
 
-command -v dpkg-query >/dev/null 2>&1 || fail "this is not a Debian system. Install PETSc 3.18 (real \
-scalars, 32-bit indices), MPI, parallel HDF5 1.10 or newer, METIS 5, libclang and pkg-config by its \
+command -v dpkg-query >/dev/null 2>&1 || fail "this is not a Debian system. Install PETSc 3.18 to 3.26 (real \
+scalars), MPI, parallel HDF5 1.10 or newer, METIS 5, libclang and pkg-config by its \
 own means, then set MPM_PAR_SKIP_SETUP=1"
 
 missing=
@@ -51,12 +51,12 @@ install || {
     $as_root apt-get update -q >"$log" 2>&1 && install
 } || {
     tail -n 20 "$log" >&2
-    fail "apt-get could not install$missing (its last words are above). Debian 12 has these \
+    fail "apt-get could not install$missing (its last words are above). Debian 12 and 13 have these \
 packages; check the network and /etc/apt/sources.list"
 }
 
 petsc=$(pkg-config --modversion petsc 2>/dev/null || pkg-config --modversion PETSc 2>/dev/null || true)
 case $petsc in
-    3.18.*) ;;
-    *) fail "PETSc 3.18 is needed, found '${petsc:-none}': Debian 12 (bookworm) has it" ;;
+    3.1[89].*|3.2[0-6].*) ;;
+    *) fail "PETSc 3.18 to 3.26 is needed, found '${petsc:-none}': Debian 12 (bookworm) and 13 (trixie) have one" ;;
 esac

@@ -227,14 +227,14 @@ impl<T: Stored> Shell<T> {
             &mut shell.0
         ))?;
         petsc!(MatShellSetContextDestroy(shell.0, Some(destroy::<T>)))?;
-        // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls each, by its
-        // place among the operations, as what it is.
+        // SAFETY: PETSc keeps functions of any signature under one type and calls each, by its place
+        // among the operations, as what it is.
         let (once, add, twice, diagonal) = unsafe {
             (
-                std::mem::transmute::<Apply, unsafe extern "C" fn()>(multiply::<T>),
-                std::mem::transmute::<Sum, unsafe extern "C" fn()>(multiply_add::<T>),
-                std::mem::transmute::<Apply, unsafe extern "C" fn()>(transposed::<T>),
-                std::mem::transmute::<Get, unsafe extern "C" fn()>(get_diagonal::<T>),
+                std::mem::transmute::<Apply, sys::AnyFunction>(multiply::<T>),
+                std::mem::transmute::<Sum, sys::AnyFunction>(multiply_add::<T>),
+                std::mem::transmute::<Apply, sys::AnyFunction>(transposed::<T>),
+                std::mem::transmute::<Get, sys::AnyFunction>(get_diagonal::<T>),
             )
         };
         petsc!(MatShellSetOperation(shell.0, sys::MATOP_MULT, Some(once)))?;
@@ -404,8 +404,8 @@ fn with_context<T>(
     outcome.map_or_else(|error| keep(&error), |()| 0)
 }
 
-unsafe extern "C" fn destroy<T>(data: *mut c_void) -> sys::PetscErrorCode {
+unsafe extern "C" fn destroy<T>(data: sys::Destroyed) -> sys::PetscErrorCode {
     // SAFETY: the box that `Shell::new` gave up, and PETSc calls this once.
-    drop(unsafe { Box::from_raw(data.cast::<Context<T>>()) });
+    drop(unsafe { Box::from_raw(sys::destroyed(data).cast::<Context<T>>()) });
     0
 }

@@ -91,10 +91,9 @@ impl ShellKsp {
         // The callbacks get this pointer back while `KSPSolve` runs and at no other time.
         let data: *mut c_void = (&raw mut *system).cast();
         petsc!(MatShellSetContext(space.product.0, data))?;
-        // SAFETY: PETSc keeps functions of any signature as `void (*)(void)` and calls each, by its
-        // place among the operations, as what it is.
-        let product =
-            unsafe { std::mem::transmute::<Apply, unsafe extern "C" fn()>(multiply::<S>) };
+        // SAFETY: PETSc keeps functions of any signature under one type and calls each, by its place
+        // among the operations, as what it is.
+        let product = unsafe { std::mem::transmute::<Apply, sys::AnyFunction>(multiply::<S>) };
         petsc!(MatShellSetOperation(space.product.0, sys::MATOP_MULT, Some(product)))?;
         if self.ours {
             let mut pc = null_mut();

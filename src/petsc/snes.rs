@@ -143,7 +143,8 @@ impl Snes {
         petsc!(SNESSetType(snes.raw, sys::SNESNEWTONLS.as_ptr().cast()))?;
         let mut search = null_mut();
         petsc!(SNESGetLineSearch(snes.raw, &mut search))?;
-        petsc!(SNESLineSearchSetType(search, sys::SNESLINESEARCHBASIC.as_ptr().cast()))?;
+        // Every version knows this word; the constant with it has changed its name.
+        petsc!(SNESLineSearchSetType(search, c"basic".as_ptr()))?;
         snes.set_max_solves(max_solves)?;
         forcing::set_default(snes.raw)?;
         Ok(snes)
