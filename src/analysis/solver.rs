@@ -14,7 +14,7 @@ use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
-use crate::petsc::{Index, Rehearsal, options};
+use crate::petsc::{Index, Rehearsal, factors, options};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 
@@ -40,9 +40,9 @@ const ONE_RANK: [usize; 2] = [150_000, 30_000];
 /// The built-in solvers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Linear {
-    /// MUMPS on one of the ranks.
+    /// Factors on one of the ranks: MUMPS's, or PETSc's own where MUMPS is missing.
     DirectOnOne,
-    /// MUMPS on all ranks.
+    /// MUMPS on all ranks; where it is missing, as `DirectOnOne`.
     Direct,
     /// Conjugate gradients, or FGMRES where the tangent is unsymmetric, with smoothed aggregation
     /// and the rigid-body modes.
@@ -117,20 +117,26 @@ impl Linear {
 
     /// One of several ranks solves for all.
     fn gathers(self, ranks: usize) -> bool {
-        self == Linear::DirectOnOne && ranks > 1
+        let on_one = match self {
+            Linear::DirectOnOne => true,
+            // PETSc's own factors are those of one rank.
+            Linear::Direct => factors::package() == factors::OWN,
+            Linear::Multigrid | Linear::Trial => false,
+        };
+        on_one && ranks > 1
     }
 
     /// Options without the prefix, on `ranks` ranks.
     pub fn options(self, ranks: usize, symmetric: bool) -> Vec<(&'static str, String)> {
-        const PACKAGE: &str = "mumps";
+        let package = factors::package();
         let list: &[(&str, &str)] = match self {
-            Linear::DirectOnOne if self.gathers(ranks) => &[
+            Linear::DirectOnOne | Linear::Direct if self.gathers(ranks) => &[
                 ("ksp_type", "preonly"),
                 ("ksp_rtol", "1e-8"),
                 ("pc_type", "telescope"),
                 ("telescope_ksp_type", "preonly"),
                 ("telescope_pc_type", "lu"),
-                ("telescope_pc_factor_mat_solver_type", PACKAGE),
+                ("telescope_pc_factor_mat_solver_type", package),
                 ("snes_lag_preconditioner", "1"),
             ],
             Linear::DirectOnOne | Linear::Direct => &[
@@ -138,7 +144,7 @@ impl Linear {
                 // Of a method that the user puts in its place.
                 ("ksp_rtol", "1e-8"),
                 ("pc_type", "lu"),
-                ("pc_factor_mat_solver_type", PACKAGE),
+                ("pc_factor_mat_solver_type", package),
                 ("snes_lag_preconditioner", "1"),
             ],
             // The first iterate's hierarchy serves the whole step, unless it has become slow.
@@ -217,13 +223,17 @@ fn newton_under(
         defaults.push(("snes_linesearch_alpha", GROWTH.into()));
     }
     if !factors(prefix)? {
-        // Mumps has no others than those of LU and Cholesky.
+        // MUMPS has no others than those of LU and Cholesky.
         defaults.retain(|(name, _)| *name != "pc_factor_mat_solver_type");
     }
     snes.set_defaults(&defaults)?;
     if null_pivots && matches!(linear, Linear::Direct | Linear::DirectOnOne) {
         let inner = if linear.gathers(world.size()) { "telescope_" } else { "" };
-        snes.set_defaults(&[(&format!("{inner}mat_mumps_icntl_24"), "1")])?;
+        let (name, value) = match factors::package() {
+            factors::MUMPS => ("mat_mumps_icntl_24", "1"),
+            _ => ("pc_factor_shift_type", "nonzero"),
+        };
+        snes.set_defaults(&[(&format!("{inner}{name}"), value)])?;
     }
     snes.set_from_options()?;
     Ok(snes)

@@ -15,6 +15,7 @@
 //! | `block_product.rs` | [`BlockProduct`]: a rank's rows in blocks ([`crate::blocks`]), and PETSc's shell over them |
 //! | `hierarchy.rs` | [`Hierarchy`]: multigrid's cycle on levels of such matrices |
 //! | `blas.rs` | the kernel that OpenBLAS runs |
+//! | `factors.rs` | whose factors direct solvers take: MUMPS's, or PETSc's own |
 //! | `object.rs` | handles given back when they go out of scope |
 //! | `ksp.rs` | [`Ksp`]: linear solver |
 //! | `shell.rs` | [`ShellKsp`]: the same where the matrix is a product of the program's |
@@ -29,6 +30,7 @@ mod abort;
 pub mod blas;
 mod block_product;
 mod check;
+pub mod factors;
 pub mod files;
 mod forcing;
 mod hierarchy;

@@ -113,7 +113,7 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
         ranks: world.size(),
         libraries: versions.clone().into_iter().collect(),
     }));
-    if let Some(note) = petsc::blas::note() {
+    for note in [petsc::blas::note(), petsc::factors::note()].into_iter().flatten() {
         log.say(&note);
     }
     let mpi = versions.get("MPI").map_or("", String::as_str);
