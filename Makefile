@@ -1,4 +1,4 @@
-# Needs cargo and a shell; on Debian 12 `make setup` installs the libraries.
+# Needs cargo and a shell; on Debian 12 and 13 `make setup` installs the libraries.
 .PHONY: gallery install-extras help setup build run install test bench iterations scaling compare docs validate portability lint clean
 
 RANKS ?= 2
@@ -17,7 +17,7 @@ help:
 	@echo "make scaling   strong and weak scaling: timed on this machine's cores, counted to 64 ranks"
 	@echo "make compare   KratosMPMApplication beside this program, in turn (network, minutes)"
 	@echo "make validate  the longer tests: decks with published numbers"
-	@echo "make portability  core tests against Debian's PETSc with 64-bit indices (network)"
+	@echo "make portability  core tests with 64-bit indices and with PETSc's newest release (network, long)"
 	@echo "make docs      the code's own documentation, and the book where mdbook is installed"
 	@echo "make gallery   a picture of every template, for docs/figures"
 	@echo "make install-extras  install, and the manual page and bash completions"
@@ -64,9 +64,9 @@ compare: build
 validate: setup
 	MPM_PAR_VALIDATION=1 cargo test --release --no-fail-fast -- --include-ignored
 
-# Nothing is installed: packages are unpacked in target/portability.
+# Nothing is installed: packages are unpacked and built in target/portability. WITH=mpich: that one.
 portability: setup
-	bash jobs/portability.sh
+	bash jobs/portability.sh $(WITH)
 
 # The book needs mdbook (cargo install mdbook); without it only the code's documentation is made.
 docs: setup

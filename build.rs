@@ -43,6 +43,10 @@ fn main() {
                 "pkg-config modules `petsc` and `PETSc`; set PKG_CONFIG_PATH to add a folder",
             ),
         });
+    // A PETSc of the user's own is found at the start of a run, too.
+    for path in petsc.link_paths.iter().filter(|path| !path.starts_with("/usr/lib")) {
+        println!("cargo:rustc-link-arg=-Wl,-rpath,{}", path.display());
+    }
     let mpi = build_probe_mpi::probe().unwrap_or_else(|_| {
         missing(
             "MPI",
