@@ -13,12 +13,14 @@ shift
 if [ "$(id -u)" = 0 ]; then
     export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 fi
-# Open MPI counts cores, not hardware threads, and refuses more ranks than it counts.
-export OMPI_MCA_rmaps_base_oversubscribe=1
+# Open MPI counts cores, not hardware threads, and refuses more ranks than it counts. The second name is
+# that of Open MPI 5.
+export OMPI_MCA_rmaps_base_oversubscribe=1 PRTE_MCA_rmaps_default_mapping_policy=:oversubscribe
 cores=$(lscpu --parse=CORE,SOCKET 2>/dev/null | grep -v '^#' | sort -u | wc -l)
 if [ "$ranks" -gt "$cores" ]; then
     # Waiting ranks give way to working ones.
-    export OMPI_MCA_hwloc_base_binding_policy=none OMPI_MCA_mpi_yield_when_idle=1
+    export OMPI_MCA_hwloc_base_binding_policy=none PRTE_MCA_hwloc_default_binding_policy=none
+    export OMPI_MCA_mpi_yield_when_idle=1
 fi
 export OMP_NUM_THREADS="${OMP_NUM_THREADS:-1}"
 

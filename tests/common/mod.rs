@@ -14,12 +14,15 @@ use mpi::environment::Universe;
 
 /// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
 const TIME_LIMIT: u32 = 120;
-/// More ranks than cores, none bound, and waiting ranks give way; root is welcome.
-const OPEN_MPI: [(&str, &str); 6] = [
+/// More ranks than cores, none bound, and waiting ranks give way; root is welcome. Open MPI 5 has its
+/// own names for the first two.
+const OPEN_MPI: [(&str, &str); 8] = [
     ("OMPI_ALLOW_RUN_AS_ROOT", "1"),
     ("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"),
     ("OMPI_MCA_rmaps_base_oversubscribe", "1"),
     ("OMPI_MCA_hwloc_base_binding_policy", "none"),
+    ("PRTE_MCA_rmaps_default_mapping_policy", ":oversubscribe"),
+    ("PRTE_MCA_hwloc_default_binding_policy", "none"),
     ("OMPI_MCA_mpi_yield_when_idle", "1"),
     ("OMP_NUM_THREADS", "1"),
 ];

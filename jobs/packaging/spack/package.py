@@ -13,7 +13,7 @@ class MpmPar(CargoPackage):
     depends_on("pkgconfig", type="build")
     depends_on("llvm+clang", type="build")
     depends_on("mpi")
-    depends_on("petsc@3.18 +mpi+hypre+mumps~int64~complex")
+    depends_on("petsc@3.18:3.26 +mpi+mumps~complex")
     depends_on("hdf5@1.10: +mpi")
     depends_on("metis@5:")
 
