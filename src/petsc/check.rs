@@ -56,14 +56,15 @@ pub(crate) fn check(code: sys::PetscErrorCode, function: &str) -> Result<()> {
     }
     let detail = MESSAGE.lock().map(|mut m| std::mem::take(&mut *m)).unwrap_or_default();
     let text = format!("PETSc error {code} from {function}: {detail}");
-    Err(match code.unsigned_abs() {
-        sys::PETSC_ERR_FP
-        | sys::PETSC_ERR_CONV_FAILED
-        | sys::PETSC_ERR_NOT_CONVERGED
-        | sys::PETSC_ERR_MAT_LU_ZRPVT
-        | sys::PETSC_ERR_MAT_CH_ZRPVT => Error::Run(text),
-        _ => Error::Environment(text),
-    })
+    // Signed or not, as PETSc's version has it.
+    let of_the_run = [
+        sys::PETSC_ERR_FP as sys::PetscErrorCode,
+        sys::PETSC_ERR_CONV_FAILED as sys::PetscErrorCode,
+        sys::PETSC_ERR_NOT_CONVERGED as sys::PetscErrorCode,
+        sys::PETSC_ERR_MAT_LU_ZRPVT as sys::PetscErrorCode,
+        sys::PETSC_ERR_MAT_CH_ZRPVT as sys::PetscErrorCode,
+    ];
+    Err(if of_the_run.contains(&code) { Error::Run(text) } else { Error::Environment(text) })
 }
 
 /// PETSc's own words in an error of [`check`], without the trace around them.
