@@ -13,9 +13,11 @@ use hardening::solve;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::amg;
+use mpm_par::amg::{CoarsestRows, Hierarchy};
+use mpm_par::blocks::BlockProduct;
 use mpm_par::parallel::World;
 use mpm_par::petsc::Index;
-use mpm_par::petsc::{BlockProduct, CoarsestRows, Hierarchy, Session};
+use mpm_par::petsc::Session;
 use nalgebra::{DMatrix, SymmetricEigen};
 
 fn build<const D: usize>(world: &World, share: &Share<D>) -> Hierarchy {

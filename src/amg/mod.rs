@@ -11,6 +11,7 @@
 //! | whose nodes they are | `owners.rs` |
 //! | coarse operator | `galerkin.rs` |
 //! | nodes and rows of a level | `level.rs` |
+//! | levels under a solver | `cycle.rs` |
 //! | symmetric part of an unsymmetric system | `symmetric_part.rs` |
 //!
 //! The levels are those of a symmetric matrix. Under an unsymmetric A they are made from
@@ -21,6 +22,7 @@
 //! any number of them.
 
 pub mod aggregate;
+pub mod cycle;
 pub mod galerkin;
 pub mod level;
 pub mod owners;
@@ -30,16 +32,17 @@ pub mod spectrum;
 pub mod strength;
 pub mod symmetric_part;
 
-use crate::petsc::Index;
+use crate::petsc::{Index, Product};
 use level::{Assembled, Nodes, Rows};
 use symmetric_part::symmetric_part;
 
-use crate::blocks::Stored;
+use crate::blocks::{BlockProduct, Stored};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
-use crate::petsc::{BlockProduct, CoarsestRows, Hierarchy, Smoothed};
 use crate::system::numbering::Numbering;
+
+pub use cycle::{CoarsestRows, Hierarchy, Levelled, Levels, Smoothed};
 
 use aggregate::Aggregates;
 use galerkin::Coarse;

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
+use crate::blocks::BlockProduct;
 use crate::error::Result;
 use crate::parallel::World;
-use crate::petsc::BlockProduct;
 
 use super::level::Nodes;
 

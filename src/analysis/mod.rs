@@ -16,6 +16,7 @@
 //! | Newton's method for a step | `newton.rs`, `convergence.rs` | Lagrangian eq. 26-30, 40 |
 //! | the equations that it solves | `equilibrium/` | Lagrangian eq. 26-30 |
 //! | default linear solvers | `solver.rs` | |
+//! | the user's options for them, tried on a small system | `rehearsal.rs` | |
 //! | a step that ends a run, in words | `failure.rs` | |
 
 pub mod conditioning;
@@ -35,6 +36,7 @@ mod inertial;
 pub mod load_steps;
 pub mod newmark;
 pub mod newton;
+mod rehearsal;
 mod release;
 pub mod round_off;
 pub mod solver;

@@ -14,11 +14,12 @@ use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::Snes;
-use crate::petsc::{Index, Rehearsal, factors, options};
+use crate::petsc::{Index, factors, options};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 
 use super::extremes;
+use super::rehearsal::Rehearsal;
 use crate::system::model::Model;
 
 /// Equations up to which the direct solver is the default in 2D and 3D: multigrid is faster from

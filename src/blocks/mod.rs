@@ -5,12 +5,15 @@
 //! |---|---|
 //! | `whole.rs` | [`Blocks`]: all blocks of each row |
 //! | `half.rs` | [`Half`]: the lower half of a symmetric matrix |
+//! | `product.rs` | [`BlockProduct`]: the rows of one rank, columns of other ranks apart |
 //! | `stored.rs` | [`Stored`]: values in single or double precision |
 
 mod half;
+mod product;
 mod stored;
 mod whole;
 
 pub use half::Half;
+pub use product::{BlockProduct, Row};
 pub use stored::Stored;
 pub use whole::Blocks;

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `model/` | the checked deck as typed data |
 //! | `stage.rs` | stages, and what is there in which of them |
-//! | `words.rs`, `fields.rs` | the deck's words for enumerations and point fields |
+//! | `choices.rs`, `fields.rs` | the deck's words for enumerations and point fields |
 //! | `schema/` | every key once: type, unit, default, range, meaning |
 //! | `tree.rs` | TOML to values with their places; `--set` |
 //! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |

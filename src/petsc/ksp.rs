@@ -111,6 +111,10 @@ impl Ksp {
         outcome(self.raw, &self.comm).map(|(outcome, _)| outcome)
     }
 
+    pub(crate) fn comm(&self) -> &SimpleCommunicator {
+        &self.comm
+    }
+
     pub(crate) fn raw(&self) -> sys::KSP {
         self.raw
     }

@@ -282,6 +282,13 @@ impl Matrix {
         self.row_offsets.last().copied().unwrap_or(0)
     }
 
+    /// A number that grows with every change of the values.
+    pub(crate) fn state(&self) -> Result<u64> {
+        let mut state = 0;
+        petsc!(PetscObjectStateGet(self.raw.cast(), &mut state))?;
+        Ok(state as u64)
+    }
+
     pub(crate) fn raw(&self) -> sys::Mat {
         self.raw
     }

@@ -8,12 +8,11 @@
 //! | `abort.rs` | the end of all ranks at once |
 //! | `options.rs` | defaults that the user can override, options nobody read |
 //! | `files.rs` | files that options name, tried before PETSc does |
-//! | `rehearsal.rs` | [`Rehearsal`]: the user's options tried on a small system |
 //! | `known.rs` | options no solver knows, told before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
-//! | `block_product.rs` | [`BlockProduct`]: a rank's rows in blocks ([`crate::blocks`]), and PETSc's shell over them |
-//! | `hierarchy.rs` | [`Hierarchy`]: multigrid's cycle on levels of such matrices |
+//! | `product_matrix.rs` | [`Product`]: a matrix that is known by its products |
+//! | `multigrid.rs` | the cycle under a solver, on levels that are given |
 //! | `blas.rs` | the kernel that OpenBLAS runs |
 //! | `factors.rs` | whose factors direct solvers take: MUMPS's, or PETSc's own |
 //! | `object.rs` | handles given back when they go out of scope |
@@ -26,21 +25,20 @@
 //! Every constructor and every method that talks to a communicator is collective. Objects that
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
-mod abort;
+pub(crate) mod abort;
 pub mod blas;
-mod block_product;
-mod check;
+pub(crate) mod check;
 pub mod factors;
 pub mod files;
 mod forcing;
-mod hierarchy;
 pub mod known;
 pub mod ksp;
 pub mod log;
 pub mod matrix;
+pub(crate) mod multigrid;
 mod object;
 pub mod options;
-mod rehearsal;
+pub(crate) mod product_matrix;
 pub mod session;
 mod shell;
 pub mod snes;
@@ -48,13 +46,11 @@ pub mod sys;
 pub mod vector;
 
 pub use abort::install_panic_hook;
-pub use block_product::BlockProduct;
 pub use check::agree;
 pub use forcing::Forcing;
-pub use hierarchy::{CoarsestRows, Hierarchy, Smoothed};
 pub use ksp::{Ksp, KspOutcome};
 pub use matrix::Matrix;
-pub use rehearsal::Rehearsal;
+pub use product_matrix::Product;
 pub use session::{Session, version};
 pub use shell::{ShellKsp, ShellSystem};
 pub use snes::{NewtonOutcome, NewtonProblem, Snes, Verdict};

@@ -14,11 +14,10 @@ use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 use super::abort::unless_shared;
 use super::check::{agree, c_text, petsc, require_running, running, text_of};
 use super::forcing::{self, Forcing};
-use super::hierarchy::{self, Hierarchy, Installed};
 use super::ksp::{self, Ranks};
 use super::vector::DEFAULT;
 use super::vector::{Index, LocalValues, LocalValuesMut, index};
-use super::{BlockProduct, Ksp, Matrix, Vector, sys};
+use super::{Ksp, Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
 /// The problem's judgement of an iterate.
@@ -60,22 +59,20 @@ pub trait NewtonProblem {
         f64::INFINITY
     }
 
-    /// Levels for a preconditioner of type `mg`, for the values that the matrix has. `None`: there
-    /// are none for it.
-    fn hierarchy(&mut self, _matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
-        Ok(None)
-    }
-
-    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact, and their
-    /// symmetric part into the matrix of its finest level.
-    fn fill(
+    /// Puts a preconditioner of the problem's own under the `solver` of the next linear solve, for the
+    /// values that the matrix has. `earlier`: linear solves of this call before. An error has to be
+    /// the same on all ranks.
+    fn prepare_solver(
         &mut self,
+        _solver: &Ksp,
         _matrix: &mut Matrix,
-        _exact: &mut BlockProduct<f64>,
-        _finest: &mut BlockProduct<f32>,
+        _earlier: usize,
     ) -> Result<()> {
         Ok(())
     }
+
+    /// Takes note of a linear solve: its iterations, and the relative tolerance it was given.
+    fn record_solve(&mut self, _iterations: usize, _tolerance: f64) {}
 }
 
 /// How a nonlinear solve ended.
@@ -111,8 +108,8 @@ struct Context<'a, P> {
     matrix: &'a mut Matrix,
     comm: &'a SimpleCommunicator,
     forcing: Option<Forcing>,
-    /// Multigrid's, where it is the preconditioner.
-    levels: Option<Installed>,
+    /// The linear solver, once more.
+    solver: Ksp,
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
@@ -200,7 +197,7 @@ impl Snes {
             matrix,
             comm: &self.comm,
             forcing: self.forcing.clone(),
-            levels: None,
+            solver: self.ksp()?,
             error: None,
             diverged: None,
             outside: false,
@@ -312,32 +309,6 @@ impl<P: NewtonProblem> Context<'_, P> {
         }
     }
 
-    /// Makes multigrid's levels for the matrix as it is, or where those there are shall serve on,
-    /// renews what the finest multiplies by.
-    fn renew_levels(&mut self, inner: sys::KSP) -> Result<()> {
-        if !hierarchy::wanted(inner)? {
-            return Ok(());
-        }
-        let (mut kept, mut state) = (sys::PETSC_FALSE, 0);
-        petsc!(KSPGetReusePreconditioner(inner, &mut kept))?;
-        petsc!(PetscObjectStateGet(self.matrix.raw().cast(), &mut state))?;
-        let kept = kept != sys::PETSC_FALSE;
-        if !self.levels.as_ref().is_some_and(|levels| levels.serves(state, kept)) {
-            let made = self.problem.hierarchy(self.matrix);
-            let made = agree(self.comm, made)?;
-            let install = |made| Installed::new(inner, self.comm, state, made);
-            let installed = made.map(install).transpose();
-            self.levels = installed.map_err(|error| unless_shared(self.comm, error))?;
-        }
-        let Some(levels) = &mut self.levels else { return Ok(()) };
-        let (problem, matrix) = (&mut *self.problem, &mut *self.matrix);
-        levels.follow(inner, state, |exact, finest| {
-            // Ranks write their rows together: an error on one must not leave the others waiting.
-            agree(self.comm, problem.fill(matrix, exact, finest))
-        })?;
-        levels.multiply_by_copy(inner, self.matrix.raw())
-    }
-
     /// Whether the iterate, reached once more by a step of zero, is converged on all ranks.
     fn judge_again(&mut self, snes: sys::SNES) -> Result<bool> {
         let iteration = self.linear_solves;
@@ -403,7 +374,8 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
     let result = unsafe { LocalValuesMut::of(rhs) }
         .and_then(|mut rhs| context.problem.before_solve(&mut rhs));
     context.agree_on(result, |context, ()| {
-        context.renew_levels(inner)?;
+        let earlier = context.linear_solves;
+        context.problem.prepare_solver(&context.solver, context.matrix, earlier)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, DEFAULT as f64);
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;
@@ -425,9 +397,7 @@ unsafe extern "C" fn after_solve<P: NewtonProblem>(
         let mut tolerance = 0.0;
         petsc!(KSPGetTolerances(inner, &mut tolerance, null_mut(), null_mut(), null_mut()))?;
         context.linear_tolerances.push(tolerance);
-        if let Some(levels) = &mut context.levels {
-            levels.record_solve(outcome.iterations, tolerance);
-        }
+        context.problem.record_solve(outcome.iterations, tolerance);
         context.linear_solves += 1;
         context.linear_total += outcome.iterations;
         context.linear_max = context.linear_max.max(outcome.iterations);

@@ -1,12 +1,13 @@
 //! A x + c x^3 = c on a made-up block, solved by Newton's method with multigrid.
 #![allow(dead_code)]
 
-use mpm_par::amg;
 use mpm_par::amg::level::BlockCsr;
 use mpm_par::amg::symmetric_part::symmetric_part;
+use mpm_par::amg::{self, Hierarchy, Levelled, Levels};
+use mpm_par::blocks::BlockProduct;
 use mpm_par::error::Result;
 use mpm_par::parallel::World;
-use mpm_par::petsc::{BlockProduct, Hierarchy, Matrix, NewtonProblem, Snes, Verdict};
+use mpm_par::petsc::{Ksp, Matrix, NewtonProblem, Snes, Verdict};
 
 use super::block::{Block, Share};
 
@@ -24,6 +25,7 @@ pub struct Hardening<'a, const D: usize> {
     /// Hierarchies made, and renewals of the finest matrix.
     made: [usize; 2],
     residual: f64,
+    installed: Levels,
 }
 
 impl<const D: usize> Hardening<'_, D> {
@@ -117,6 +119,19 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
         Ok(if self.residual < 1e-12 { Verdict::Converged } else { Verdict::Continue })
     }
 
+    fn prepare_solver(&mut self, solver: &Ksp, matrix: &mut Matrix, earlier: usize) -> Result<()> {
+        let mut levels = std::mem::take(&mut self.installed);
+        let outcome = levels.prepare(self, solver, matrix, earlier);
+        self.installed = levels;
+        outcome
+    }
+
+    fn record_solve(&mut self, iterations: usize, tolerance: f64) {
+        self.installed.record_solve(iterations, tolerance);
+    }
+}
+
+impl<const D: usize> Levelled for Hardening<'_, D> {
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         if !self.levels {
             return Ok(None);
@@ -195,8 +210,16 @@ pub fn solve_under<const D: usize>(
     load: f64,
 ) -> Result<Solved> {
     let share = block.share(world);
-    let mut problem =
-        Hardening { world, share, levels, symmetric, load, made: [0; 2], residual: f64::NAN };
+    let mut problem = Hardening {
+        world,
+        share,
+        levels,
+        symmetric,
+        load,
+        made: [0; 2],
+        residual: f64::NAN,
+        installed: Levels::default(),
+    };
     let (offsets, columns, values) = problem.scalars(&problem.share.rows);
     let rows = problem.share.nodes.owned * D;
     let mut matrix = Matrix::from_csr(world.comm(), D, rows, &offsets, &columns, &values).unwrap();

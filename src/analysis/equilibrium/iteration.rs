@@ -1,13 +1,14 @@
 //! What Newton's method asks of the equations: residual, tangent, reactions, end of the iteration.
 
-use crate::amg;
 use crate::amg::level::Assembled;
 use crate::amg::symmetric_part::symmetric_part;
+use crate::amg::{self, Hierarchy, Levelled};
 use crate::analysis::convergence::{converges_next, hardly_falls};
+use crate::blocks::BlockProduct;
 use crate::error::Result;
+use crate::petsc::Ksp;
 use crate::petsc::matrix::Matrix;
 use crate::petsc::snes::{NewtonProblem, Verdict};
-use crate::petsc::{BlockProduct, Hierarchy};
 use crate::system::in_place::InPlace;
 use std::time::Instant;
 
@@ -91,6 +92,19 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         self.errors.last().map_or(f64::INFINITY, |error| error / self.settings.tolerance)
     }
 
+    fn prepare_solver(&mut self, solver: &Ksp, matrix: &mut Matrix, earlier: usize) -> Result<()> {
+        let mut levels = std::mem::take(&mut self.levels);
+        let outcome = levels.prepare(self, solver, matrix, earlier);
+        self.levels = levels;
+        outcome
+    }
+
+    fn record_solve(&mut self, iterations: usize, tolerance: f64) {
+        self.levels.record_solve(iterations, tolerance);
+    }
+}
+
+impl<const D: usize> Levelled for Equilibrium<'_, D> {
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         self.with_rows(matrix, |rows| {
             let symmetric = self.symmetric();

@@ -7,6 +7,7 @@
 mod error;
 mod iteration;
 
+use crate::amg::Levels;
 use crate::deck::model::{Frame, InvertedIterates};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -72,6 +73,8 @@ pub struct Equilibrium<'a, const D: usize> {
     beside: Vec<f64>,
     /// What the matrix holds.
     tangent: Tangent,
+    /// Multigrid's, where it is the preconditioner.
+    levels: Levels,
     displacement: Vec<f64>,
     previous_owned: Vec<f64>,
     internal_owned: Vec<f64>,
@@ -182,6 +185,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             addresses,
             beside,
             tangent: Tangent::Stale,
+            levels: Levels::default(),
             displacement: vec![0.0; numbering.len() * D],
             previous_owned: vec![0.0; owned],
             internal_owned: vec![0.0; owned],

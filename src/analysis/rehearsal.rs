@@ -4,16 +4,15 @@
 //!
 //! The options are copied to a prefix of their own: those of the run stay unread.
 
-use super::vector::Index;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 
-use super::block_product::{BlockProduct, Row};
-use super::check::{agree, essence};
-use super::hierarchy::{CoarsestRows, Hierarchy, Smoothed};
-use super::known::without_nesting;
-use super::{Ksp, Matrix, NewtonProblem, Snes, Verdict, options};
+use crate::amg::{CoarsestRows, Hierarchy, Levelled, Levels, Smoothed};
+use crate::blocks::{BlockProduct, Row};
 use crate::error::{Error, Result};
+use crate::petsc::check::essence;
+use crate::petsc::known::without_nesting;
+use crate::petsc::{Index, Ksp, Matrix, NewtonProblem, Snes, Verdict, agree, options};
 
 /// Stands for the prefix of the solver.
 const PREFIX: &str = "rehearsal_";
@@ -72,7 +71,7 @@ impl Rehearsal {
             let mut matrix = chain::<D>(comm)?;
             let mut x = matrix.vector()?;
             let first = comm.rank() as usize * BLOCKS;
-            snes.solve(&mut Chain::<D> { first }, &mut matrix, &mut x)
+            snes.solve(&mut Chain::<D> { first, levels: Levels::default() }, &mut matrix, &mut x)
         });
         self.end(comm, outcome.map(drop))
     }
@@ -152,6 +151,7 @@ fn chain<const D: usize>(comm: &SimpleCommunicator) -> Result<Matrix> {
 struct Chain<const D: usize> {
     /// Number of this rank's first block.
     first: usize,
+    levels: Levels,
 }
 
 impl<const D: usize> NewtonProblem for Chain<D> {
@@ -177,6 +177,19 @@ impl<const D: usize> NewtonProblem for Chain<D> {
         Ok(if small { Verdict::Converged } else { Verdict::Continue })
     }
 
+    fn prepare_solver(&mut self, solver: &Ksp, matrix: &mut Matrix, earlier: usize) -> Result<()> {
+        let mut levels = std::mem::take(&mut self.levels);
+        let outcome = levels.prepare(self, solver, matrix, earlier);
+        self.levels = levels;
+        outcome
+    }
+
+    fn record_solve(&mut self, iterations: usize, tolerance: f64) {
+        self.levels.record_solve(iterations, tolerance);
+    }
+}
+
+impl<const D: usize> Levelled for Chain<D> {
     fn hierarchy(&mut self, _matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         let mut exact = BlockProduct::symmetric::<D>(BLOCKS, Vec::new(), 3 * BLOCKS);
         exact.fill::<D>(push::<D>);

@@ -1,0 +1,168 @@
+//! Levels under a solver: when they are made, how long they serve, what they multiply by.
+//!
+//! Smoothers, residuals and transfers multiply by matrices in single precision: they stream from
+//! memory, and have less than half the bytes. The iteration outside keeps the exact matrix, so the
+//! answer does not change. The levels are symmetric. Under an unsymmetric matrix A they are those of
+//! (A + A^T) / 2.
+
+use crate::blocks::BlockProduct;
+use crate::error::{Error, Result};
+use crate::petsc::abort::unless_shared;
+use crate::petsc::multigrid::{self, Level};
+use crate::petsc::product_matrix::ProductMatrix;
+use crate::petsc::{Index, Ksp, Matrix, agree};
+
+/// Levels from the finest to the last but one, and the last.
+pub struct Hierarchy {
+    /// The matrix A itself. That of the finest level is its symmetric part, rounded.
+    pub exact: BlockProduct<f64>,
+    pub levels: Vec<Smoothed>,
+    pub coarsest: CoarsestRows,
+}
+
+/// A level with a smoother.
+pub struct Smoothed {
+    /// Its matrix A.
+    pub product: BlockProduct<f32>,
+    /// Largest eigenvalue of D^-1 A.
+    pub largest: f64,
+    /// P, from the next level to this one.
+    pub transfer: BlockProduct<f32>,
+}
+
+/// This rank's rows of the last level, compressed: global columns, ascending.
+#[derive(Debug, Default)]
+pub struct CoarsestRows {
+    pub block: usize,
+    pub offsets: Vec<Index>,
+    pub columns: Vec<Index>,
+    pub values: Vec<f64>,
+}
+
+/// A problem whose solver may have a preconditioner of type `mg`.
+pub trait Levelled {
+    /// Levels for the values that the matrix has. `None`: there are none for it.
+    fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>>;
+
+    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact, and their
+    /// symmetric part into the matrix of its finest level.
+    fn fill(
+        &mut self,
+        matrix: &mut Matrix,
+        exact: &mut BlockProduct<f64>,
+        finest: &mut BlockProduct<f32>,
+    ) -> Result<()>;
+}
+
+/// Chebyshev's smoother takes care of the eigenvalues between these shares of the largest: further
+/// down than PETSc's own multigrid goes, as the groups of the finest level are large.
+const SMOOTHED: [f64; 2] = [0.06, 1.1];
+
+/// New levels cost about as much as so many iterations (measured: 20 in the plane, 40 in space).
+const WORTH: f64 = 25.0;
+
+/// The levels under the solver of one problem.
+#[derive(Default)]
+pub struct Levels(Option<Installed>);
+
+/// A hierarchy in use.
+struct Installed {
+    /// States of the matrix that the levels were made for, and that the products hold.
+    made: u64,
+    filled: u64,
+    exact: ProductMatrix<BlockProduct<f64>>,
+    /// From the finest on.
+    levels: Vec<Level<BlockProduct<f32>>>,
+    /// Iterations per digit of the first solve.
+    pace: Option<f64>,
+    slow: bool,
+}
+
+impl Levels {
+    /// Before a linear solve: makes levels for the matrix as it is, or where those there are shall
+    /// serve on, renews what the finest multiplies by. Nothing is done where the preconditioner is
+    /// another. `earlier`: solves with these equations before. Collective.
+    pub fn prepare(
+        &mut self,
+        problem: &mut impl Levelled,
+        solver: &Ksp,
+        matrix: &mut Matrix,
+        earlier: usize,
+    ) -> Result<()> {
+        if earlier == 0 {
+            self.0 = None;
+        }
+        if !multigrid::is_wanted(solver)? {
+            return Ok(());
+        }
+        let (kept, state) = (multigrid::is_kept(solver)?, matrix.state()?);
+        if !self.0.as_ref().is_some_and(|levels| levels.serves(state, kept)) {
+            let made = agree(solver.comm(), problem.hierarchy(matrix))?;
+            let installed = made.map(|made| Installed::new(solver, state, made)).transpose();
+            self.0 = installed.map_err(|error| unless_shared(solver.comm(), error))?;
+        }
+        let Some(levels) = &mut self.0 else { return Ok(()) };
+        levels.follow(solver, state, |exact, finest| {
+            // Ranks write their rows together: an error on one must not leave the others waiting.
+            agree(solver.comm(), problem.fill(matrix, exact, finest))
+        })?;
+        multigrid::multiply_by(solver, &levels.exact, matrix)
+    }
+
+    /// After a linear solve: levels that have become slow are not kept.
+    pub fn record_solve(&mut self, iterations: usize, tolerance: f64) {
+        let Some(levels) = &mut self.0 else { return };
+        let (iterations, digits) = (iterations as f64, -tolerance.log10());
+        match levels.pace {
+            None => levels.pace = Some(iterations / digits),
+            Some(pace) => levels.slow = iterations - pace * digits > WORTH,
+        }
+    }
+}
+
+impl Installed {
+    /// Collective.
+    fn new(solver: &Ksp, state: u64, hierarchy: Hierarchy) -> Result<Self> {
+        let Hierarchy { exact, levels, coarsest } = hierarchy;
+        let comm = solver.comm();
+        let level = |Smoothed { product, largest, transfer }| -> Result<_> {
+            Ok(Level {
+                matrix: ProductMatrix::new(comm, product)?,
+                transfer: ProductMatrix::new(comm, transfer)?,
+                smoothed: SMOOTHED.map(|share| share * largest),
+            })
+        };
+        let levels = levels.into_iter().map(level).collect::<Result<Vec<_>>>()?;
+        if levels.is_empty() {
+            return Err(Error::Environment("a hierarchy without levels".into()));
+        }
+        let CoarsestRows { block, offsets, columns, values } = coarsest;
+        let rows = offsets.len() - 1;
+        let coarsest = Matrix::from_csr(comm, block, rows, &offsets, &columns, &values)?;
+        multigrid::install(solver, &levels, &coarsest)?;
+        let exact = ProductMatrix::new(comm, exact)?;
+        Ok(Installed { made: state, filled: state, exact, levels, pace: None, slow: false })
+    }
+
+    /// Whether the levels shall serve for the matrix of `state`; `kept`: the user's lag says so.
+    fn serves(&self, state: u64, kept: bool) -> bool {
+        self.made == state || (kept && !self.slow)
+    }
+
+    /// Lets `fill` write the values of `state` into the exact matrix and the finest level's, if
+    /// they are not there yet; the finest smoother follows, the other levels stay.
+    fn follow(
+        &mut self,
+        solver: &Ksp,
+        state: u64,
+        fill: impl FnOnce(&mut BlockProduct<f64>, &mut BlockProduct<f32>) -> Result<()>,
+    ) -> Result<()> {
+        if self.filled == state {
+            return Ok(());
+        }
+        self.filled = state;
+        let finest = &mut self.levels[0].matrix;
+        self.exact.change(|exact| finest.change(|rounded| fill(exact, rounded)))?;
+        multigrid::renew_finest_smoother(solver)
+    }
+}

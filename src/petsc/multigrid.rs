@@ -1,0 +1,125 @@
+//! Multigrid's cycle (`-<prefix>pc_type mg`) under a solver, on levels that are given.
+//!
+//! PETSc runs the cycle, with its smoothers and coarse solver under the usual options
+//! (`-<prefix>mg_levels_ksp_type`, `-<prefix>mg_coarse_pc_type`, ...).
+
+use std::ptr::{null, null_mut};
+
+use mpi::collective::SystemOperation;
+use mpi::traits::{Communicator, CommunicatorCollectives};
+
+use super::check::{petsc, text_of};
+use super::options::set_default;
+use super::product_matrix::{Product, ProductMatrix};
+use super::{Ksp, Matrix, sys};
+use crate::error::{Error, Result};
+
+/// A level with a smoother.
+pub(crate) struct Level<P> {
+    pub matrix: ProductMatrix<P>,
+    /// From the next level to this one.
+    pub transfer: ProductMatrix<P>,
+    /// Eigenvalues of D^-1 A, least and largest, between which Chebyshev's smoother acts.
+    pub smoothed: [f64; 2],
+}
+
+/// Whether the solver's preconditioner is a cycle.
+pub(crate) fn is_wanted(solver: &Ksp) -> Result<bool> {
+    is_type(preconditioner(solver)?, sys::PCMG)
+}
+
+fn preconditioner(solver: &Ksp) -> Result<sys::PC> {
+    let mut pc = null_mut();
+    petsc!(KSPGetPC(solver.raw(), &mut pc))?;
+    Ok(pc)
+}
+
+fn is_type(pc: sys::PC, kind: &[u8]) -> Result<bool> {
+    let mut same = sys::PETSC_FALSE;
+    petsc!(PetscObjectTypeCompare(pc.cast(), kind.as_ptr().cast(), &mut same))?;
+    Ok(same != sys::PETSC_FALSE)
+}
+
+/// Puts `levels`, from the finest to the last but one, and the last, `coarsest`, under a solver with
+/// operators; whatever it had goes. Collective.
+pub(crate) fn install<P: Product>(
+    solver: &Ksp,
+    levels: &[Level<P>],
+    coarsest: &Matrix,
+) -> Result<()> {
+    let count = levels.len() as sys::PetscInt;
+    let pc = preconditioner(solver)?;
+    petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
+    petsc!(PCSetType(pc, sys::PCMG.as_ptr().cast()))?;
+    petsc!(PCMGSetLevels(pc, count + 1, null_mut()))?;
+    for (number, level) in (1..=count).rev().zip(levels) {
+        put_level(pc, number, level)?;
+    }
+    put_coarsest(solver, pc, coarsest)?;
+    petsc!(PCSetFromOptions(pc))
+}
+
+/// Smoother, residual and transfer of a level.
+fn put_level<P: Product>(pc: sys::PC, number: sys::PetscInt, level: &Level<P>) -> Result<()> {
+    let (mut smoother, mut inner) = (null_mut(), null_mut());
+    petsc!(PCMGGetSmoother(pc, number, &mut smoother))?;
+    petsc!(KSPSetType(smoother, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
+    petsc!(KSPGetPC(smoother, &mut inner))?;
+    petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?;
+    let (matrix, transfer) = (level.matrix.raw(), level.transfer.raw());
+    petsc!(KSPSetOperators(smoother, matrix, matrix))?;
+    let [low, high] = level.smoothed;
+    petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
+    petsc!(KSPSetFromOptions(smoother))?;
+    // PETSc would find out in the middle of a cycle, and not get out of it without a crash.
+    if is_type(inner, sys::PCSOR)? || is_type(inner, sys::PCEISENSTAT)? {
+        return Err(Error::Input(
+            "SOR and Eisenstat's form of it need the entries of the matrix, and the levels of multigrid (pc_type mg) have \
+             only products: use mg_levels_pc_type jacobi, or pc_type gamg"
+                .into(),
+        ));
+    }
+    petsc!(PCMGSetInterpolation(pc, number, transfer))?;
+    petsc!(PCMGSetRestriction(pc, number, transfer))
+}
+
+/// Solved by factors: on the rank that has all of it, else by PETSc's default, a copy for each.
+fn put_coarsest(solver: &Ksp, pc: sys::PC, matrix: &Matrix) -> Result<()> {
+    let mut coarse = null_mut();
+    petsc!(PCMGGetCoarseSolve(pc, &mut coarse))?;
+    petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))?;
+    let (comm, mut holders) = (solver.comm(), 0);
+    comm.all_reduce_into(&i32::from(matrix.rows_local() > 0), &mut holders, SystemOperation::sum());
+    if holders == 1 && comm.size() > 1 {
+        let (mut inner, mut prefix) = (null_mut(), null());
+        petsc!(KSPGetPC(coarse, &mut inner))?;
+        petsc!(PCSetType(inner, sys::PCBJACOBI.as_ptr().cast()))?;
+        petsc!(KSPGetOptionsPrefix(coarse, &mut prefix))?;
+        set_default(&format!("{}sub_pc_type", text_of(prefix)), "lu")?;
+    }
+    Ok(())
+}
+
+/// Lets the smoother of the finest level follow the values of its matrix.
+pub(crate) fn renew_finest_smoother(solver: &Ksp) -> Result<()> {
+    let (pc, mut levels, mut smoother) = (preconditioner(solver)?, 0, null_mut());
+    petsc!(PCMGGetLevels(pc, &mut levels))?;
+    petsc!(PCMGGetSmoother(pc, levels - 1, &mut smoother))?;
+    petsc!(KSPSetUp(smoother))
+}
+
+/// Makes the iteration multiply by `product`, which stands for `matrix`.
+pub(crate) fn multiply_by<P: Product>(
+    solver: &Ksp,
+    product: &ProductMatrix<P>,
+    matrix: &Matrix,
+) -> Result<()> {
+    petsc!(KSPSetOperators(solver.raw(), product.raw(), matrix.raw()))
+}
+
+/// Whether the user's lag says that the preconditioner of an earlier matrix shall serve on.
+pub(crate) fn is_kept(solver: &Ksp) -> Result<bool> {
+    let mut kept = sys::PETSC_FALSE;
+    petsc!(KSPGetReusePreconditioner(solver.raw(), &mut kept))?;
+    Ok(kept != sys::PETSC_FALSE)
+}
