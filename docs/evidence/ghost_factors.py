@@ -97,7 +97,7 @@ def collapse(factor, basis, shift, height):
 def disc(factor, dimension, cells, place, amplitude, steps):
     """Linear iterations a solve; errors of the stress over E times the amplitude: mean, largest.
 
-    The swelling disc or ball of tests/bench/iterations.rs.
+    The swelling disc or ball of jobs/bench/iterations.rs.
     """
     h = 1 / cells
     s = h / 2

@@ -53,6 +53,7 @@ pub use model::Deck;
 pub use places::Places;
 pub use problems::{figure, nearest, rough};
 pub use resolved::resolved;
+pub use sections::petsc::PREFIXES as PETSC_PREFIXES;
 pub use shape::Shape;
 pub use stage::{Presence, Stage, When};
 pub use unread::is_read;

@@ -91,6 +91,16 @@ pub(crate) fn text_of(text: *const c_char) -> String {
     unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
+/// Gives back memory that PETSc allocated for the caller; `PetscFree` is a macro over this pointer.
+pub(crate) fn free<T>(memory: *mut T) {
+    // SAFETY: PETSc's own function for memory of its own; null is left alone.
+    unsafe {
+        if let Some(free) = sys::PetscTrFree {
+            free(memory.cast(), 0, c"free".as_ptr(), c"check.rs".as_ptr());
+        }
+    }
+}
+
 pub(crate) fn c_text(text: &str) -> Result<CString> {
     CString::new(text)
         .map_err(|_| Error::Input(format!("`{}` holds a zero byte", text.escape_debug())))

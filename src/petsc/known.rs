@@ -1,17 +1,18 @@
 //! Options that no solver knows, told before the run instead of never.
 //!
 //! PETSc ignores what nobody asks for. Here each option that is still unread after the start is
-//! shown, under a name of its own, to solvers of all kinds: an option that none of them reads is
-//! a mistake. One that is known but not used by the run is only warned of at its end.
+//! shown, under a name of its own, to solvers of all kinds that PETSc has: an option that none of
+//! them reads is a mistake. One that is known but not used by the run is only warned of at its end.
+//! Names that PETSc asks for later than that, or under prefixes of its own, cannot be had from it and
+//! are listed.
 
 use std::ptr::null_mut;
 
-use super::check::{c_text, essence, petsc};
+use super::check::{c_text, essence, free, petsc, text_of};
 use super::{options, sys};
+use crate::deck::PETSC_PREFIXES as PREFIXES;
 use crate::error::{Error, Result};
 
-/// Prefixes of the program's solvers: equilibrium, mass, extreme eigenvalues.
-const PREFIXES: [&str; 3] = ["qs_", "mass_", "kappa_"];
 /// Prefixes that PETSc puts before the options of solvers inside solvers.
 const NESTED: [&str; 10] = [
     "pc_gamg_esteig_",
@@ -56,56 +57,6 @@ const GENERAL: [&str; 18] = [
     "is_",
     "ao_",
     "petsc",
-];
-const METHODS: [&str; 22] = [
-    "preonly",
-    "cg",
-    "gmres",
-    "fgmres",
-    "lgmres",
-    "dgmres",
-    "pgmres",
-    "bcgs",
-    "bcgsl",
-    "ibcgs",
-    "fbcgs",
-    "minres",
-    "richardson",
-    "chebyshev",
-    "tfqmr",
-    "pipecg",
-    "pipefgmres",
-    "fcg",
-    "gcr",
-    "cr",
-    "cgne",
-    "symmlq",
-];
-const PRECONDITIONERS: [&str; 24] = [
-    "none",
-    "lu",
-    "cholesky",
-    "ilu",
-    "icc",
-    "jacobi",
-    "pbjacobi",
-    "bjacobi",
-    "asm",
-    "gasm",
-    "sor",
-    "eisenstat",
-    "gamg",
-    "mg",
-    "hypre",
-    "ml",
-    "fieldsplit",
-    "composite",
-    "ksp",
-    "redundant",
-    "telescope",
-    "deflation",
-    "hmg",
-    "svd",
 ];
 /// They would solve with a matrix that the next residual has written into.
 const WITHOUT_TANGENT: [&str; 4] =
@@ -245,8 +196,10 @@ fn ask(base: &str, value: &str) -> Result<Answer> {
     let kinds = if base.starts_with("snes_") {
         vec![Kind::Newton]
     } else {
-        let methods = METHODS.iter().map(|method| Kind::Linear(method, "none"));
-        methods.chain(PRECONDITIONERS.iter().map(|pc| Kind::Linear("preonly", pc))).collect()
+        let (methods, preconditioners) = registered()?;
+        let methods = methods.into_iter().map(|method| Kind::Linear(method, "none".into()));
+        let inside = |pc| Kind::Linear("preonly".into(), pc);
+        methods.chain(preconditioners.into_iter().map(inside)).collect()
     };
     let shown = format!("-{PROBE}{base}");
     let mut refused = None;
@@ -294,16 +247,33 @@ fn unknown(name: &str) -> Result<String> {
     Ok(format!("unknown PETSc option -{name}{hint}"))
 }
 
+/// Names of the methods and of the preconditioners that this PETSc has.
+fn registered() -> Result<(Vec<String>, Vec<String>)> {
+    petsc!(KSPInitializePackage())?;
+    petsc!(PCInitializePackage())?;
+    // SAFETY: PETSc has filled both lists and keeps them.
+    let (methods, preconditioners) = unsafe { (sys::KSPList, sys::PCList) };
+    Ok((names_in(methods)?, names_in(preconditioners)?))
+}
+
+fn names_in(list: sys::PetscFunctionList) -> Result<Vec<String>> {
+    let (mut names, mut count) = (null_mut(), 0);
+    petsc!(PetscFunctionListGet(list, &mut names, &mut count))?;
+    // SAFETY: PETSc returned `count` names.
+    let texts = (0..count as usize).map(|k| text_of(unsafe { *names.add(k) })).collect();
+    free(names);
+    Ok(texts)
+}
+
 /// A solver that is made only to read its options.
-#[derive(Clone, Copy)]
 enum Kind {
     Newton,
     /// Method and preconditioner.
-    Linear(&'static str, &'static str),
+    Linear(String, String),
 }
 
 impl Kind {
-    fn read_options(self) -> Result<()> {
+    fn read_options(&self) -> Result<()> {
         match self {
             Kind::Newton => newton(),
             Kind::Linear(method, pc) => linear(method, pc),

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::ptr::{null, null_mut};
 use std::sync::Mutex;
 
-use super::check::{c_text, petsc, require_running, text_of};
+use super::check::{c_text, free, petsc, require_running, text_of};
 use super::sys;
 use crate::error::Result;
 
@@ -50,12 +50,7 @@ fn all() -> Result<String> {
     let mut text = null_mut();
     petsc!(PetscOptionsGetAll(null_mut(), &mut text))?;
     let all = text_of(text);
-    // SAFETY: PETSc allocated the text for the caller; `PetscFree` is a macro over this pointer.
-    unsafe {
-        if let Some(free) = sys::PetscTrFree {
-            free(text.cast(), 0, c"is_set".as_ptr(), c"options.rs".as_ptr());
-        }
-    }
+    free(text);
     Ok(all)
 }
 

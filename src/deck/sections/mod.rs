@@ -30,7 +30,7 @@ mod ghost;
 mod grid;
 mod initial_stress;
 mod materials;
-mod petsc;
+pub(super) mod petsc;
 mod probes;
 mod restraint;
 mod results;

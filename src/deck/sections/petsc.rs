@@ -9,7 +9,7 @@ use crate::deck::reader::Table;
 use crate::deck::tree::{Node, Value};
 
 /// Prefixes of the program's solvers: equilibrium, mass, extreme eigenvalues.
-const PREFIXES: [&str; 3] = ["qs_", "mass_", "kappa_"];
+pub const PREFIXES: [&str; 3] = ["qs_", "mass_", "kappa_"];
 /// Beginnings of solvers' options that lack their prefix.
 const OF_SOLVERS: [&str; 5] = ["ksp_", "pc_", "snes_", "mg_", "mat_mumps_"];
 /// Allowed besides, without a value: PETSc's table of times on the terminal.

@@ -5,9 +5,9 @@
 //! `cargo build --benches`, then `mpirun -n RANKS target/.../unsymmetric-*`. Iterations per linear
 //! solve, to 1e-8. BCGSL multiplies twice in an iteration.
 
-#[path = "../common/block.rs"]
+#[path = "../../tests/common/block.rs"]
 mod block;
-#[path = "../common/hardening.rs"]
+#[path = "../../tests/common/hardening.rs"]
 mod hardening;
 
 use block::Block;
