@@ -21,15 +21,15 @@
 //! depends on how nodes are dealt out to ranks but the order of sums: iterations are the same on
 //! any number of them.
 
-pub mod aggregate;
-pub mod cycle;
-pub mod galerkin;
+pub(crate) mod aggregate;
+pub(crate) mod cycle;
+pub(crate) mod galerkin;
 pub mod level;
-pub mod owners;
-pub mod prolongator;
-pub mod rigid;
-pub mod spectrum;
-pub mod strength;
+pub(crate) mod owners;
+pub(crate) mod prolongator;
+pub(crate) mod rigid;
+pub(crate) mod spectrum;
+pub(crate) mod strength;
 pub mod symmetric_part;
 
 use crate::petsc::{Index, Product};

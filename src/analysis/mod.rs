@@ -19,28 +19,28 @@
 //! | the user's options for them, tried on a small system | `rehearsal.rs` | |
 //! | a step that ends a run, in words | `failure.rs` | |
 
-pub mod conditioning;
-pub mod convergence;
+pub(crate) mod conditioning;
+pub(crate) mod convergence;
 mod damping;
-pub mod element_test;
+pub(crate) mod element_test;
 pub mod equilibrium;
-pub mod explicit;
-pub mod explicit_contact;
+pub(crate) mod explicit;
+pub(crate) mod explicit_contact;
 mod explicit_nodes;
-pub mod explicit_step;
+pub(crate) mod explicit_step;
 mod external;
-pub mod extremes;
-pub mod failure;
-pub mod implicit;
+pub(crate) mod extremes;
+pub(crate) mod failure;
+pub(crate) mod implicit;
 mod inertial;
-pub mod load_steps;
-pub mod newmark;
-pub mod newton;
+pub(crate) mod load_steps;
+pub(crate) mod newmark;
+pub(crate) mod newton;
 mod rehearsal;
 mod release;
-pub mod round_off;
+pub(crate) mod round_off;
 pub mod solver;
 mod stage_changes;
-pub mod strength_reduction;
-pub mod time_loop;
-pub mod time_steps;
+pub(crate) mod strength_reduction;
+pub(crate) mod time_loop;
+pub(crate) mod time_steps;

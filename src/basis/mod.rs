@@ -14,14 +14,14 @@
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
-pub mod centre;
+pub(crate) mod centre;
 pub mod contract;
-pub mod domain;
-pub mod gimp;
-pub mod groups;
-pub mod mpm;
+pub(crate) mod domain;
+pub(crate) mod gimp;
+pub(crate) mod groups;
+pub(crate) mod mpm;
 mod product;
-pub mod radial;
+pub(crate) mod radial;
 
 #[cfg(test)]
 mod tests;
@@ -29,10 +29,10 @@ mod tests;
 pub use domain::update_domains;
 pub use groups::Groups;
 
-pub mod corner;
-pub mod cpdi1;
+pub(crate) mod corner;
+pub(crate) mod cpdi1;
 pub mod cpdi2;
-pub mod row;
+pub(crate) mod row;
 
 pub use row::Row;
 

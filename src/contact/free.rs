@@ -129,8 +129,8 @@ impl<const D: usize> FreeBody<D> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contact::Surface;
     use crate::contact::cuboid::Cuboid;
+    use crate::contact::surface::Surface;
     use crate::tensor::dense::apply;
 
     /// A box that spins about an axis that is none of its own keeps its energy and L to the order of

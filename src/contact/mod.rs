@@ -24,26 +24,26 @@
 //! A new surface is one file that implements [`Surface`] and one line of `contacts.rs`. The forces
 //! and their tangent are a term of the equations: `system/terms/contact.rs`.
 
-pub mod ball;
-pub mod capsule;
-pub mod cone;
-pub mod contacts;
-pub mod corner;
-pub mod cuboid;
-pub mod facets;
-pub mod free;
-pub mod half_space;
-pub mod law;
-pub mod motion;
-pub mod outline;
-pub mod pose;
-pub mod solid;
-pub mod start;
-pub mod surface;
-pub mod triangles;
+pub(crate) mod ball;
+pub(crate) mod capsule;
+pub(crate) mod cone;
+pub(crate) mod contacts;
+pub(crate) mod corner;
+pub(crate) mod cuboid;
+pub(crate) mod facets;
+pub(crate) mod free;
+pub(crate) mod half_space;
+pub(crate) mod law;
+pub(crate) mod motion;
+pub(crate) mod outline;
+pub(crate) mod pose;
+pub(crate) mod solid;
+pub(crate) mod start;
+pub(crate) mod surface;
+pub(crate) mod triangles;
 
-pub use contacts::{Contacts, Pair, Rigid};
-pub use surface::{Near, Surface};
+pub use contacts::{Contacts, Pair};
+pub use surface::Near;
 
 #[cfg(test)]
 mod tests;

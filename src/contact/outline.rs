@@ -58,10 +58,6 @@ impl Outline {
         Self::new(&whole)
     }
 
-    pub fn corners(&self) -> &[[f64; 2]] {
-        &self.corners
-    }
-
     /// The signed distance at a place.
     pub fn near(&self, x: &[f64; 2]) -> Near<2> {
         let count = self.corners.len();

@@ -22,14 +22,14 @@ impl<const D: usize> Pose<D> {
     }
 
     /// x of X, m.
-    pub fn to_space(&self, place: &[f64; D]) -> [f64; D] {
+    pub fn to_space(self, place: &[f64; D]) -> [f64; D] {
         let arm = std::array::from_fn(|i| place[i] - self.centre[i]);
         let turned = apply(&self.turn, &arm);
         std::array::from_fn(|i| self.centre[i] + self.shift[i] + turned[i])
     }
 
     /// X of x, m.
-    pub fn to_body(&self, x: &[f64; D]) -> [f64; D] {
+    pub fn to_body(self, x: &[f64; D]) -> [f64; D] {
         let arm = std::array::from_fn(|i| x[i] - self.centre[i] - self.shift[i]);
         let turned = self.vector_to_body(&arm);
         std::array::from_fn(|i| self.centre[i] + turned[i])

@@ -10,8 +10,8 @@
 //! | `stencil.rs` | the scalar face matrix J_G and its scalings | Ghost eq. 23, 24, 27, 28 |
 
 mod cells;
-pub mod faces;
-pub mod stencil;
+pub(crate) mod faces;
+pub(crate) mod stencil;
 mod ties;
 
 pub use cells::BoundaryFace;

@@ -36,11 +36,6 @@ pub fn read<const D: usize>(path: &Path) -> Result<Mesh<D>> {
     draft(&contents, element, path)?.finish()
 }
 
-/// Dimension of the mesh in a file, 2 or 3. Errors as for [`read`], without its checks.
-pub fn dimension(path: &Path) -> Result<usize> {
-    Ok(element_of(&parse(path)?, path)?.dimension())
-}
-
 fn wrong(path: &Path, message: impl std::fmt::Display) -> Error {
     Error::Input(format!("mesh file {}: {message}", path.display()))
 }

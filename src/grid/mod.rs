@@ -14,20 +14,20 @@
 //! and `locate.rs` (which cell holds a place), `interpolate.rs` (the basis at a place), `face.rs` ([`FaceJump`] for Ghost).
 //! Node and cell numbers are global `usize` values, the same on every rank.
 
-pub mod bins;
-pub mod check;
-pub mod element;
-pub mod face;
+pub(crate) mod bins;
+pub(crate) mod check;
+pub(crate) mod element;
+pub(crate) mod face;
 pub mod generate;
-pub mod gmsh;
-pub mod interpolate;
-pub mod inverse_map;
-pub mod lattice;
-pub mod locate;
-pub mod mesh;
-pub mod motion;
-pub mod msh;
-pub mod quadrature;
+pub(crate) mod gmsh;
+pub(crate) mod interpolate;
+pub(crate) mod inverse_map;
+pub(crate) mod lattice;
+pub(crate) mod locate;
+pub(crate) mod mesh;
+pub(crate) mod motion;
+pub(crate) mod msh;
+pub(crate) mod quadrature;
 mod topology;
 
 #[cfg(test)]

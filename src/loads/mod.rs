@@ -15,9 +15,9 @@
 
 mod body_force;
 mod gravity;
-pub mod manufactured;
+pub(crate) mod manufactured;
 mod point;
-pub mod pressure;
+pub(crate) mod pressure;
 mod surface_pressure;
 mod traction;
 mod water;

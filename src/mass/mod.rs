@@ -9,11 +9,11 @@
 //! | `solver.rs`, `system.rs` | PETSc's KSP for it; the product and the preconditioner that it calls |
 //! | `incomplete.rs`, `elimination.rs` | that preconditioner: Cholesky without fill, and its order |
 
-pub mod elimination;
-pub mod grid_mass;
-pub mod incomplete;
-pub mod inverse;
-pub mod light_nodes;
-pub mod matrix;
-pub mod solver;
-pub mod system;
+pub(crate) mod elimination;
+pub(crate) mod grid_mass;
+pub(crate) mod incomplete;
+pub(crate) mod inverse;
+pub(crate) mod light_nodes;
+pub(crate) mod matrix;
+pub(crate) mod solver;
+pub(crate) mod system;

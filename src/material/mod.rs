@@ -26,13 +26,13 @@
 //! Where parameters vary in space, each point carries its own, and the model is made from them
 //! whenever the point responds; where they are numbers, it is made once for the body.
 
-pub mod cam_clay;
-pub mod drucker_prager;
-pub mod hencky;
+pub(crate) mod cam_clay;
+pub(crate) mod drucker_prager;
+pub(crate) mod hencky;
 mod local;
 mod model;
-pub mod mohr_coulomb;
-pub mod neo_hookean;
+pub(crate) mod mohr_coulomb;
+pub(crate) mod neo_hookean;
 pub mod parameter;
 #[cfg(test)]
 mod published;
@@ -43,8 +43,8 @@ mod published_metals;
 mod softening;
 #[cfg(test)]
 mod softening_tests;
-pub mod tresca;
-pub mod von_mises;
+pub(crate) mod tresca;
+pub(crate) mod von_mises;
 
 #[cfg(test)]
 mod tests;

@@ -14,8 +14,8 @@
 //! | `ring.rs` | what the hoop direction adds with axisymmetry |
 //! | `tangent.rs` | from principal moduli to A_ijkl of a frame |
 
-pub mod dilation;
-pub mod ring;
+pub(crate) mod dilation;
+pub(crate) mod ring;
 mod tangent;
 mod update;
 

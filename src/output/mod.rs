@@ -19,21 +19,21 @@
 //! Functions that take a communicator are collective: every rank calls them and every rank gets
 //! the same outcome, also when only one of them met the error.
 
-pub mod agreement;
-pub mod directory;
-pub mod extent;
-pub mod names;
-pub mod ownership;
-pub mod plot;
-pub mod report;
+pub(crate) mod agreement;
+pub(crate) mod directory;
+pub(crate) mod extent;
+pub(crate) mod names;
+pub(crate) mod ownership;
+pub(crate) mod plot;
+pub(crate) mod report;
 pub mod restart;
-pub mod series;
-pub mod start;
-pub mod summary;
-pub mod tables;
-pub mod terminal;
-pub mod warnings;
-pub mod whole_file;
+pub(crate) mod series;
+pub(crate) mod start;
+pub(crate) mod summary;
+pub(crate) mod tables;
+pub(crate) mod terminal;
+pub(crate) mod warnings;
+pub(crate) mod whole_file;
 
 #[cfg(test)]
 mod tests;

@@ -16,20 +16,20 @@
 //! | `launcher.rs` | whether the launcher belongs to this MPI |
 //! | `signals.rs` | SIGTERM and SIGUSR1 as a wish of all ranks |
 
-pub mod balance;
-pub mod bricks;
-pub mod cells;
-pub mod diffuse;
+pub(crate) mod balance;
+pub(crate) mod bricks;
+pub(crate) mod cells;
+pub(crate) mod diffuse;
 pub mod exchange;
-pub mod halo;
-pub mod launcher;
-pub mod metis;
+pub(crate) mod halo;
+pub(crate) mod launcher;
+pub(crate) mod metis;
 pub mod migrate;
-pub mod nearest;
+pub(crate) mod nearest;
 pub mod partition;
-pub mod signals;
-pub mod traffic;
-pub mod world;
+pub(crate) mod signals;
+pub(crate) mod traffic;
+pub(crate) mod world;
 
 pub use exchange::exchange;
 pub use halo::{HaloPlan, exchange_known};

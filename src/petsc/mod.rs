@@ -26,24 +26,24 @@
 //! outlive the [`Session`] are not destroyed one by one: PETSc has already ended.
 
 pub(crate) mod abort;
-pub mod blas;
+pub(crate) mod blas;
 pub(crate) mod check;
-pub mod factors;
-pub mod files;
+pub(crate) mod factors;
+pub(crate) mod files;
 mod forcing;
-pub mod known;
-pub mod ksp;
+pub(crate) mod known;
+pub(crate) mod ksp;
 pub mod log;
-pub mod matrix;
+pub(crate) mod matrix;
 pub(crate) mod multigrid;
 mod object;
 pub mod options;
 pub(crate) mod product_matrix;
-pub mod session;
+pub(crate) mod session;
 mod shell;
 pub mod snes;
-pub mod sys;
-pub mod vector;
+pub(crate) mod sys;
+pub(crate) mod vector;
 
 pub use abort::install_panic_hook;
 pub use check::agree;

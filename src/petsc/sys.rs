@@ -3,7 +3,14 @@
 
 use std::ffi::c_void;
 
-#[allow(non_upper_case_globals, non_camel_case_types, non_snake_case, dead_code, clippy::all)]
+#[allow(
+    non_upper_case_globals,
+    non_camel_case_types,
+    non_snake_case,
+    dead_code,
+    unused_imports,
+    clippy::all
+)]
 mod generated {
     include!(concat!(env!("OUT_DIR"), "/petsc.rs"));
 }

@@ -13,16 +13,16 @@
 //! | `share.rs` | which of them a rank makes |
 //! | `sort.rs` | points in the order of their cells |
 
-pub mod coverage;
-pub mod file;
-pub mod former;
+pub(crate) mod coverage;
+pub(crate) mod file;
+pub(crate) mod former;
 mod gather;
 mod named;
-pub mod overlap;
+pub(crate) mod overlap;
 pub mod seed;
 mod seed_cells;
 pub mod share;
-pub mod sort;
+pub(crate) mod sort;
 mod sub_cells;
 
 use std::f64::consts::TAU;

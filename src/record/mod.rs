@@ -13,13 +13,13 @@
 //! | wall time by phase | `clock.rs` | |
 //! | checkpoints and restarts | `checkpointing.rs` | |
 
-pub mod checkpointing;
-pub mod clock;
-pub mod contact;
-pub mod context;
-pub mod ledger;
-pub mod probes;
-pub mod reactions;
-pub mod recorder;
-pub mod step;
-pub mod verify;
+pub(crate) mod checkpointing;
+pub(crate) mod clock;
+pub(crate) mod contact;
+pub(crate) mod context;
+pub(crate) mod ledger;
+pub(crate) mod probes;
+pub(crate) mod reactions;
+pub(crate) mod recorder;
+pub(crate) mod step;
+pub(crate) mod verify;

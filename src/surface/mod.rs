@@ -16,10 +16,10 @@
 //! its carrier, which moves, is stored and changes ranks as all points do; and it couples no nodes
 //! that its carrier does not couple.
 
-pub mod carriers;
-pub mod of_shape;
+pub(crate) mod carriers;
+pub(crate) mod of_shape;
 mod piece;
-pub mod sheet;
+pub(crate) mod sheet;
 
 use std::ops::Range;
 

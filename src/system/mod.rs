@@ -22,21 +22,21 @@
 //! | `face_points.rs` | the cells of points on faces, where the mass decides |
 //! | `terms/` | contributions to the equations |
 
-pub mod border;
+pub(crate) mod border;
 pub mod conditions;
-pub mod face_points;
-pub mod graph;
+pub(crate) mod face_points;
+pub(crate) mod graph;
 pub mod held;
 pub mod in_place;
-pub mod kernel;
+pub(crate) mod kernel;
 pub mod model;
-pub mod node_index;
+pub(crate) mod node_index;
 pub mod numbering;
 pub mod pattern;
 pub mod plain;
-pub mod populated;
+pub(crate) mod populated;
 pub mod scatter;
 pub mod step_system;
-pub mod support_columns;
-pub mod supports;
+pub(crate) mod support_columns;
+pub(crate) mod supports;
 pub mod terms;

@@ -9,9 +9,9 @@
 //! Second-order tensors in `D` dimensions are `[[f64; D]; D]`, row first; what is
 //! three-dimensional even in plane strain is a `nalgebra::Matrix3`.
 
-pub mod dense;
-pub mod fused;
-pub mod spectral;
+pub(crate) mod dense;
+pub(crate) mod fused;
+pub(crate) mod spectral;
 
 pub use dense::Square;
 pub use spectral::Spectrum;

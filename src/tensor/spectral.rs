@@ -105,12 +105,14 @@ impl Spectrum {
 }
 
 /// ln A of a symmetric positive tensor.
+#[cfg(test)]
 pub fn logarithm(a: &Matrix3<f64>) -> Matrix3<f64> {
     let spectrum = Spectrum::of(a);
     spectrum.compose(spectrum.values.map(f64::ln))
 }
 
 /// exp A of a symmetric tensor.
+#[cfg(test)]
 pub fn exponential(a: &Matrix3<f64>) -> Matrix3<f64> {
     let spectrum = Spectrum::of(a);
     spectrum.compose(spectrum.values.map(f64::exp))

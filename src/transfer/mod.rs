@@ -10,10 +10,10 @@
 //! | what carries the points | `transport.rs` | Ghost eq. 9 |
 //! | the mesh between steps | `mesh_motion.rs` | Rotation §2 (viii) |
 
-pub mod affine;
-pub mod mapping;
-pub mod mesh_motion;
-pub mod nodal_sums;
-pub mod refusal;
-pub mod transport;
+pub(crate) mod affine;
+pub(crate) mod mapping;
+pub(crate) mod mesh_motion;
+pub(crate) mod nodal_sums;
+pub(crate) mod refusal;
+pub(crate) mod transport;
 pub mod update;

@@ -10,10 +10,10 @@
 //! | `smooth.rs` | [`Smooth`]: a formula evaluated on jets |
 
 mod grammar;
-pub mod jet;
+pub(crate) mod jet;
 mod operators;
 mod program;
-pub mod smooth;
+pub(crate) mod smooth;
 #[cfg(test)]
 mod tests;
 

@@ -13,7 +13,7 @@
 
 mod bodies;
 mod contact;
-pub mod materials;
+pub(crate) mod materials;
 mod problem;
 
 pub use crate::material::parameter::{ANY, POSITIVE, Range, at_least, between, inside};

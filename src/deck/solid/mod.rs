@@ -18,13 +18,13 @@ mod boxes;
 mod closed;
 mod meeting;
 mod nearest;
-pub mod stl;
-pub mod terrain;
+pub(crate) mod stl;
+pub(crate) mod terrain;
 
 use std::path::{Path, PathBuf};
 
 use boxes::Boxes;
-pub use nearest::{Feature, Nearest};
+pub use nearest::Feature;
 
 use super::crossing::Side;
 

@@ -7,7 +7,7 @@
 //! | proof that a file is whole and unchanged | `seal.rs` |
 //! | one run at a time in a directory | `run_lock.rs` |
 
-pub mod checkpoint;
-pub mod run_lock;
-pub mod run_state;
+pub(crate) mod checkpoint;
+pub(crate) mod run_lock;
+pub(crate) mod run_state;
 pub mod seal;

@@ -16,7 +16,7 @@ pub struct GridFrame<'a, const D: usize> {
     pub element: Element,
     /// Owned active nodes, m.
     pub coordinates: &'a [[f64; D]],
-    /// Owned active cells: [`nodes_of`] the element node numbers per cell, row by row.
+    /// Owned active cells: the element's node numbers per cell, row by row.
     pub connectivity: &'a [usize],
     /// Displacement over the last step, m, per owned node.
     pub displacement_increment: &'a [[f64; D]],
@@ -28,11 +28,6 @@ pub struct GridFrame<'a, const D: usize> {
     pub ghost_boundary: &'a [bool],
     /// More numbers per owned cell: name and values.
     pub cell_fields: &'a [(&'a str, &'a [f64])],
-}
-
-/// Nodes of a cell of this kind.
-pub fn nodes_of(element: Element) -> usize {
-    topology_of(element).nodes_per_element()
 }
 
 fn topology_of(element: Element) -> Topology {

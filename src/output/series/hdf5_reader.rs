@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 use std::ptr::null;
 
 use hdf5::H5Type;
-use hdf5::types::TypeDescriptor;
 use hdf5_sys::h5::hsize_t;
-use hdf5_sys::h5a::H5Aread;
 use hdf5_sys::h5d::H5Dread;
 use hdf5_sys::h5i::hid_t;
 use hdf5_sys::h5p::{
@@ -18,7 +16,7 @@ use hdf5_sys::h5p::{
 use hdf5_sys::h5s::{
     H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none,
 };
-use mpi::topology::{Communicator, SimpleCommunicator};
+use mpi::topology::SimpleCommunicator;
 use mpi::traits::AsRaw;
 
 use crate::error::{Error, Result};
@@ -105,22 +103,9 @@ impl<'c> FileReader<'c> {
         self.read_rows(name, 0, total)
     }
 
-    /// Reads the rows `total * rank / size .. total * (rank + 1) / size`: an equal share.
-    pub fn read_share<T: H5Type + Clone + Default>(&self, name: &str) -> Result<Vec<T>> {
-        let total = self.shape(name)?.0;
-        let (rank, size) = (self.comm.rank() as usize, self.comm.size() as usize);
-        let (first, end) = (total * rank / size, total * (rank + 1) / size);
-        self.read_rows(name, first, end - first)
-    }
-
     pub fn read_number<T: H5Type>(&self, name: &str) -> Result<T> {
         let outcome =
             self.file.attr(name).and_then(|attribute| attribute.as_reader().read_scalar());
-        accept(self.comm, outcome, |reason| read_failed(&self.path, name, reason))
-    }
-
-    pub fn read_text(&self, name: &str) -> Result<String> {
-        let outcome = self.file.attr(name).and_then(|attribute| read_text_attribute(&attribute));
         accept(self.comm, outcome, |reason| read_failed(&self.path, name, reason))
     }
 
@@ -198,22 +183,6 @@ impl Drop for Owned {
         // SAFETY: `id` came from the call that belongs to `close` and is closed only here.
         hdf5::sync::sync(|| unsafe { (self.close)(self.id) });
     }
-}
-
-fn read_text_attribute(attribute: &hdf5::Attribute) -> hdf5::Result<String> {
-    let kind = attribute.dtype()?;
-    if !matches!(kind.to_descriptor()?, TypeDescriptor::FixedUnicode(_)) || !attribute.is_scalar() {
-        return Err("it is not a text of fixed length".into());
-    }
-    let mut bytes = vec![0_u8; kind.size()];
-    hdf5::sync::sync(|| {
-        // SAFETY: both identifiers are open and `bytes` is as long as the type.
-        hdf5::h5check(unsafe { H5Aread(attribute.id(), kind.id(), bytes.as_mut_ptr().cast()) })
-    })?;
-    while bytes.last() == Some(&0) {
-        bytes.pop();
-    }
-    String::from_utf8(bytes).map_err(|reason| reason.to_string().into())
 }
 
 /// Turns this rank's HDF5 outcome into the outcome of all ranks.

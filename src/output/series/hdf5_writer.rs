@@ -112,11 +112,6 @@ impl<'c> FileWriter<'c> {
         })
     }
 
-    /// Attaches a text of less than 64 kB to the file; the same on every rank.
-    pub fn write_text(&self, name: &str, text: &str) -> Result<()> {
-        self.lay_out(|file| write_text_attribute(file, name, text))
-    }
-
     /// Lets rank 0 add groups, links and attributes to the file; every rank gets the outcome.
     pub fn arrange(&self, act: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> Result<()> {
         self.lay_out(act)

@@ -11,15 +11,15 @@
 //! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
 //! | XDMF time series | `xdmf.rs`, `growing_file.rs` |
 
-pub mod domains;
-pub mod frame_list;
-pub mod frames;
-pub mod grid_file;
-pub mod growing_file;
-pub mod hdf5_reader;
-pub mod hdf5_writer;
-pub mod point_field;
-pub mod points_file;
-pub mod rigid_file;
-pub mod vtu;
-pub mod xdmf;
+pub(crate) mod domains;
+pub(crate) mod frame_list;
+pub(crate) mod frames;
+pub(crate) mod grid_file;
+pub(crate) mod growing_file;
+pub(crate) mod hdf5_reader;
+pub(crate) mod hdf5_writer;
+pub(crate) mod point_field;
+pub(crate) mod points_file;
+pub(crate) mod rigid_file;
+pub(crate) mod vtu;
+pub(crate) mod xdmf;

@@ -6,6 +6,6 @@
 //! | `residuals.csv` | `residuals.rs` |
 //! | any such table | `csv_table.rs` |
 
-pub mod csv_table;
-pub mod history;
-pub mod residuals;
+pub(crate) mod csv_table;
+pub(crate) mod history;
+pub(crate) mod residuals;

@@ -43,7 +43,8 @@ impl Log {
         }
     }
 
-    /// A silent log, for tests and for work that has nobody to talk to.
+    /// A log that says nothing.
+    #[cfg(test)]
     pub fn silent() -> Self {
         Self {
             speaks: false,

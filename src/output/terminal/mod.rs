@@ -6,6 +6,6 @@
 //! | how often a line is worth saying | `progress.rs` |
 //! | the log itself | `log.rs` |
 
-pub mod log;
-pub mod progress;
-pub mod report;
+pub(crate) mod log;
+pub(crate) mod progress;
+pub(crate) mod report;

@@ -7,10 +7,10 @@
 //! | does something hold every rigid motion of every piece? | `support.rs`, `pieces.rs` |
 //! | does the problem fit into the machine? | `memory.rs`, `free_memory.rs` |
 
-pub mod contact;
+pub(crate) mod contact;
 mod contest;
-pub mod formulas;
-pub mod free_memory;
-pub mod memory;
-pub mod pieces;
-pub mod support;
+pub(crate) mod formulas;
+pub(crate) mod free_memory;
+pub(crate) mod memory;
+pub(crate) mod pieces;
+pub(crate) mod support;

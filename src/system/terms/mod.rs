@@ -17,9 +17,9 @@
 
 mod block;
 pub mod contact;
-pub mod following;
+pub(crate) mod following;
 pub mod ghost;
-pub mod inertia;
+pub(crate) mod inertia;
 mod own_traction;
 pub mod pressure;
 mod scalar;
