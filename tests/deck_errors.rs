@@ -433,6 +433,20 @@ fn checks_of_the_grid() {
             (&["grid.generate.annulus.element=hex8"], "expected one of \"quad4\", \"tri3\""),
             (&["grid.generate.annulus.element=quad"], "did you mean \"quad4\"?"),
             (
+                &["grid.generate={ box = { spacing = [[[0, 1], [0, 1]], [[0, 1], [2, 1]]] } }"],
+                "pairs [place, spacing] for each axis, places ascending",
+            ),
+            (
+                &["grid.generate={ box = { spacing = [[[0, 1], [2, 0]], [[0, 1], [2, 1]]] } }"],
+                "pairs [place, spacing there] > 0 (m), found 0",
+            ),
+            (
+                &[
+                    "grid.generate={ box = { min = [0, 0], spacing = [[[0, 1], [2, 1]], [[0, 1], [2, 1]]] } }",
+                ],
+                "only without spacing",
+            ),
+            (
                 &["boundary.0.rotation=", "boundary.0.fix=[\"x\"]"],
                 "no [[boundary]] with where = { tag = \"inner\" } prescribes a rotation",
             ),

@@ -122,7 +122,8 @@ fn tangent<const D: usize>(
 ) -> Result<()> {
     let (model, mut points) = block::<D>(world, basis, per_cell, material)?;
     let mesh = strained(world, &model, &mut points)?;
-    assert!(!model.symmetric());
+    // Sand flows with less dilation than friction.
+    assert_eq!(model.symmetric(), material != SAND);
     let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
     let at = field::<D>(&mesh, 0.04, 1.7);
     let along = field::<D>(&mesh, 1.0, 3.1);
@@ -168,10 +169,24 @@ fn tangent<const D: usize>(
             assert!(off < 1e-6, "{what}: {difference:e} by differences, {product:e}");
         }
     }
+    if material == RUBBER {
+        let work: f64 = reference.iter().zip(&along).map(|(f, u)| f * u).sum();
+        let stored = |by: f64| -> f64 {
+            let u: Vec<f64> = at.iter().zip(&along).map(|(u, a)| u + by * a).collect();
+            let made = update::increments(step, &u);
+            let mut after = points.clone();
+            update::respond(&model.materials, made.straining(), &mut after, None).strain
+        };
+        let by = 1e-4;
+        let slope = (stored(by) - stored(-by)) / (2.0 * by);
+        let size: f64 = reference.iter().zip(&along).map(|(f, u)| (f * u).abs()).sum();
+        let off = (slope - work).abs() / size;
+        assert!(off < 1e-7, "{basis}, {per_cell}: {work:e} against {slope:e} of the energy");
+    }
     Ok(())
 }
 
-/// 4 and 9 points a cell (8 and 27 in space), elastic and flowing, in the three frames.
+/// Also that the force is the derivative of the stored energy; 4 and 9 points a cell (8 and 27 in space), elastic and flowing, in the three frames.
 #[test]
 fn the_tangent_is_the_derivative_of_the_force() {
     on_ranks("the_tangent_is_the_derivative_of_the_force", &[1], |universe| {
@@ -293,24 +308,56 @@ fn capacity(run: Run) -> [f64; 2] {
     [factors.iter().copied().fold(0.0, f64::max), *factors.last().expect("rows")]
 }
 
-/// Prandtl's 2 + pi, from above as h falls; without F-bar there is no plateau.
+/// Grid lines of inputs/footing.toml with all distances times `factor`.
+fn footing_lines(factor: f64) -> String {
+    let axis = |stations: &[[f64; 2]]| {
+        let pair = |[at, h]: &[f64; 2]| format!("[{at:?}, {:?}]", h * factor);
+        format!("[{}]", stations.iter().map(pair).collect::<Vec<_>>().join(", "))
+    };
+    let x = axis(&[[0.0, 0.4], [1.0, 0.02], [6.0, 1.0]]);
+    let y = axis(&[[0.0, 0.6], [3.0, 0.02], [3.1, 0.1]]);
+    format!("grid.generate.box.spacing=[{x}, {y}]")
+}
+
+/// Prandtl's 2 + pi, from above as h falls, 2 % with eight cells in the half width; without F-bar there is
+/// no plateau.
 #[test]
 fn a_footing_on_clay_has_the_capacity_of_prandtl() {
     let exact = 2.0 + std::f64::consts::PI;
-    let [coarse, fine] = ["grid.h=0.25", "grid.h=0.125"].map(|h| {
-        let [most, end] = capacity(Run::of("footing").set(h).ranks(2));
-        assert!((end / most - 1.0).abs() < 5e-3, "{h}: no plateau, {most} and {end}");
-        assert!(most > exact, "{h}: {most}");
+    let [coarse, fine] = [2.0, 1.0].map(|factor| {
+        let [most, end] = capacity(Run::of("footing").set(footing_lines(factor)).ranks(2));
+        assert!((end / most - 1.0).abs() < 5e-3, "{factor}: no plateau, {most} and {end}");
+        assert!(most > exact, "{factor}: {most}");
         most
     });
-    assert!(fine < 1.06 * exact, "{fine}");
-    // The excess is that of half a cell.
-    let ratio = (coarse - exact) / (fine - exact);
-    assert!((1.6..2.4).contains(&ratio), "{coarse}, {fine}");
-    let extrapolated = 2.0 * fine - coarse;
-    assert!((extrapolated / exact - 1.0).abs() < 0.01, "{extrapolated}");
+    assert!(fine < 1.02 * exact, "{fine}");
+    assert!(fine < coarse, "{coarse}, {fine}");
+    let smooth = "boundary.0={ name = \"footing\", where = { box = { min = [0, 3], max = [1, 3] } }, \
+                  displacement = { y = -3e-3 } }";
+    let [most, _] = capacity(Run::of("footing").set(smooth).ranks(2));
+    assert!(most > 0.99 * exact && most < 1.02 * exact, "smooth: {most}");
     let [locked, _] = capacity(Run::of("footing").set("method.locking=\"none\"").ranks(2));
     assert!(locked > 1.35 * exact, "{locked}");
+}
+
+/// On equal cells the last held node's motion fades over the cell beside it: the excess is that of about
+/// 0.4 cells, and halves with h.
+#[test]
+fn equal_cells_make_a_footing_wider() {
+    let exact = 2.0 + std::f64::consts::PI;
+    let on_lattice = |h: f64| {
+        let grid = format!("grid={{ type = \"lattice\", size = [6.0, 3.5], h = {h} }}");
+        let tagged = ["left", "right", "bottom"]
+            .iter()
+            .enumerate()
+            .map(|(k, side)| format!("boundary.{}.where={{ side = \"{side}\" }}", k + 1));
+        tagged.fold(Run::of("footing").set(grid), Run::set).ranks(2)
+    };
+    let [coarse, fine] = [0.25, 0.125].map(|h| capacity(on_lattice(h))[0]);
+    let ratio = (coarse - exact) / (fine - exact);
+    assert!((1.6..2.4).contains(&ratio), "{coarse}, {fine}");
+    let cells = (fine / exact - 1.0) / 0.125;
+    assert!((0.3..0.5).contains(&cells), "{fine}: {cells} cells");
 }
 
 /// r_(k+1) = C r_k^q near the end, above what rounding leaves.
@@ -332,9 +379,13 @@ fn pressures_of_an_undrained_slope_are_those_of_its_weight() {
         let pressure = points.field("pressure");
         pressure.iter().fold((0.0f64, 0.0f64), |(l, h), p| (l.min(*p), h.max(*p)))
     };
-    let free = Run::of("clay-slope").results();
-    let (low, high) = extremes(&free);
-    assert!(high < weight && low > -0.25 * weight, "from {low:e} to {high:e} Pa");
+    // Domains over two cells leave pressures that cancel in each cell: gimp is rougher than mpm.
+    for (basis, most) in [("mpm", 1.0), ("gimp", 1.5)] {
+        let free = Run::of("clay-slope").set(format!("method.basis=\"{basis}\"")).results();
+        let (low, high) = extremes(&free);
+        let bounds = -0.3 * weight..most * weight;
+        assert!(bounds.contains(&low) && bounds.contains(&high), "{basis}: {low:e} to {high:e} Pa");
+    }
     let locked = Run::of("clay-slope").set("method.locking=\"none\"").results();
     let (low, high) = extremes(&locked);
     assert!(high > 1.5 * weight || low < -weight, "from {low:e} to {high:e} Pa");

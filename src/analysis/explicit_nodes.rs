@@ -226,7 +226,8 @@ impl<'a, const D: usize> Nodes<'a, D> {
             velocity.to_vec()
         };
         deforming.iter_mut().for_each(|v| *v *= self.dt);
-        let deformation = mapping::displacement_gradients(step, &deforming);
+        let mut deformation = mapping::displacement_gradients(step, &deforming);
+        deformation.common = mapping::common_increments(step, &deforming);
         let averaged = update::averaged(step, &deforming, &deformation);
         update::require_sound_deformation(self.world, points, &deformation, &averaged)?;
         let straining = update::straining(&deformation, &averaged);

@@ -256,7 +256,10 @@ fn refuse<const D: usize>(
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
     let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
-        deformation: Deformation { blocks: vec![[[0.0; D]; D]; points.len()], hoops: Vec::new() },
+        deformation: Deformation {
+            blocks: vec![[[0.0; D]; D]; points.len()],
+            ..Deformation::default()
+        },
         averaged: Deformation::default(),
         displacement: made.displacement.clone(),
         corners: Vec::new(),

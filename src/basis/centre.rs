@@ -2,16 +2,56 @@
 //! 333:1 for material points).
 //!
 //! The change of volume that a point's stress sees is taken where a cell's functions can represent a
-//! constant one. For `mpm` it is the mean Σ V ∇N / Σ V over the points of the cell: one volumetric constraint in
-//! each cell, however many points it holds. In a cell that the material fills this is the value at the
-//! centre, which the sources take. In a cell at the body's surface the centre may lie where there is no
-//! material: a pressure would work there on a change of volume that the points do not have, while the mean
-//! keeps it, Σ V ∇N_0 = Σ V ∇N. For `gimp` it is the mean over the centres of all cells that the domain overlaps,
-//! each weighted by its share of the domain. Both reproduce the gradient of linear fields exactly, so that
-//! a uniform deformation stays what it is.
+//! constant one: as the mean over the material in the cell, Σ V ∇N / Σ V. In a cell that the material
+//! fills this is the value at the centre, which the sources take. In a cell at the body's surface the
+//! centre may lie where there is no material: a pressure would work there on a change of volume that the points
+//! do not have, while the mean keeps it, Σ V ∇N_0 = Σ V ∇N, so that a uniform pressure acts as it does
+//! without F-bar. A uniform deformation stays what it is.
+//!
+//! For `mpm` the sums run over the points of the cell. For `gimp` they run over the parts of all domains that lie in
+//! the cell, whichever rank they live on, and a point takes the mean of its cells, each weighted by its share of
+//! the domain: Σ_c w_pc Σ_q V_q w_qc <∇N>_qc / Σ_q V_q w_qc. The functions of a cell are linear along
+//! each axis, so that moments of the parts give these means.
 
-use super::{Groups, Influences};
+use super::gimp::spans;
+use super::product::for_each_index;
+use super::radial::pieces_of_rings;
+use super::{Groups, Influences, lattice_of};
+use crate::error::Result;
+use crate::grid::{Grid, Lattice};
 use crate::points::Points;
+
+/// Moments of the material in a cell, m3: entry m is Σ V Π ξ_a over the axes a in the bits of m, ξ in [0, 1]
+/// the place in the cell. Of rings, whose V is weighted by the radius, entries 4 + m are those of
+/// 1/r, m2.
+pub type Moments = [f64; 8];
+
+/// Local nodes of the points' rows.
+#[derive(Clone, Copy)]
+pub struct RowNodes<'a> {
+    pub groups: &'a Groups,
+    /// Of each entry of `groups.nodes`
+    pub nodes: &'a [u32],
+    /// Local nodes
+    pub count: usize,
+}
+
+impl RowNodes<'_> {
+    fn of(&self, p: usize) -> &[u32] {
+        let (group, offsets) = (self.groups.group_of_point[p], &self.groups.node_offsets);
+        &self.nodes[offsets[group]..offsets[group + 1]]
+    }
+}
+
+/// Fills the rows of F-bar with the means over the points of each cell ([`means`]).
+pub(super) fn fill_from_points<const D: usize>(points: &Points<D>, influences: &mut Influences<D>) {
+    let gradients = means(points, influences, &influences.gradients);
+    let hoops: Vec<[f64; 1]> = influences.hoop.iter().map(|hoop| [*hoop]).collect();
+    if !hoops.is_empty() {
+        influences.centre_hoop = means(points, influences, &hoops).into_flattened();
+    }
+    influences.centre_gradients = gradients;
+}
 
 /// Means of the entries' `values` over the points of each cell, weighted by their volumes. A cell's points live
 /// on one rank, and their rows are those of the cell. A point on a face whose row was made in a cell of choice
@@ -42,4 +82,147 @@ pub(super) fn means<const D: usize, const N: usize>(
         }
     }
     means
+}
+
+/// A domain's part in a cell, along one axis.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Piece {
+    /// Of the domain, of rings by volume
+    pub share: f64,
+    /// Mean place in the cell, so weighted
+    pub place: f64,
+    /// Of rings along the radius: share of the area over the domain's radius, 1/m; and the plain mean place.
+    pub plain: [f64; 2],
+}
+
+/// The parts of point `p`'s domain along each axis, and the first cell of each.
+fn pieces<const D: usize>(
+    grid: &Grid<D>,
+    lattice: &Lattice<D>,
+    points: &Points<D>,
+    p: usize,
+    rings: bool,
+    out: &mut [Vec<Piece>; D],
+) -> Result<()> {
+    let spans = spans(grid, lattice, points, p)?;
+    let (x, half) = (&points.position[p], &points.half_length[p]);
+    for (axis, line) in out.iter_mut().enumerate() {
+        line.clear();
+        let span = spans[axis];
+        if rings && axis == 0 {
+            let ends = [(x[0] - half[0]).max(0.0), x[0] + half[0]];
+            pieces_of_rings(lattice, span.first, span.last - span.first + 1, ends, line);
+            continue;
+        }
+        let reach = half[axis] / lattice.spacing[axis];
+        let offset = lattice.scaled(axis, x[axis]) - span.first as f64;
+        let (low, high, last) = (offset - reach, offset + reach, span.last - span.first);
+        for cell in 0..=last {
+            let start = if cell == 0 { low } else { cell as f64 };
+            let end = if cell == last { high } else { (cell + 1) as f64 };
+            let (share, place) = ((end - start) / (high - low), 0.5 * (start + end) - cell as f64);
+            line.push(Piece { share, place, plain: [0.0; 2] });
+        }
+    }
+    Ok(())
+}
+
+/// Moments of this rank's domains at the lowest node of each cell (local).
+pub(super) fn moments_of_domains<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    rings: bool,
+    rows: RowNodes<'_>,
+) -> Result<Vec<Moments>> {
+    let lattice = lattice_of(grid)?;
+    let mut sums = vec![Moments::default(); rows.count];
+    let mut parts: [Vec<Piece>; D] = std::array::from_fn(|_| Vec::new());
+    for p in 0..points.len() {
+        pieces(grid, lattice, points, p, rings, &mut parts)?;
+        let (nodes, volume) = (rows.of(p), points.volume(p));
+        let counts = parts.each_ref().map(|line| line.len());
+        for_each_index(&counts, |index| {
+            let sum = &mut sums[nodes[place_in_row(&counts, index)] as usize];
+            for mask in 0..1 << D {
+                let (mut moment, mut inverse) = (volume, volume);
+                for axis in 0..D {
+                    let piece = &parts[axis][index[axis]];
+                    let bit = mask >> axis & 1 == 1;
+                    let own = piece.share * if bit { piece.place } else { 1.0 };
+                    moment *= own;
+                    inverse *= match axis {
+                        0 => piece.plain[0] * if bit { piece.plain[1] } else { 1.0 },
+                        _ => own,
+                    };
+                }
+                sum[mask] += moment;
+                if rings {
+                    sum[4 + mask] += inverse;
+                }
+            }
+        });
+    }
+    Ok(sums)
+}
+
+/// Fills the rows of F-bar from the moments of all ranks' domains.
+pub(super) fn fill_from_domains<const D: usize>(
+    grid: &Grid<D>,
+    points: &Points<D>,
+    influences: &mut Influences<D>,
+    rows: RowNodes<'_>,
+    sums: &[Moments],
+) -> Result<()> {
+    let lattice = lattice_of(grid)?;
+    let rings = !influences.hoop.is_empty();
+    influences.centre_gradients = vec![[0.0; D]; influences.nodes.len()];
+    influences.centre_hoop = vec![0.0; influences.hoop.len()];
+    let mut parts: [Vec<Piece>; D] = std::array::from_fn(|_| Vec::new());
+    for p in 0..points.len() {
+        pieces(grid, lattice, points, p, rings, &mut parts)?;
+        let (nodes, start) = (rows.of(p), influences.row(p).start);
+        let counts = parts.each_ref().map(|line| line.len());
+        for_each_index(&counts, |index| {
+            let sum = &sums[nodes[place_in_row(&counts, index)] as usize];
+            let share: f64 = (0..D).map(|a| parts[a][index[a]].share).product();
+            let weight = share / sum[0];
+            for corner in 0..1usize << D {
+                let node = std::array::from_fn(|a| index[a] + (corner >> a & 1));
+                let at = start + place_in_row(&counts, node);
+                for axis in 0..D {
+                    let others = !(1usize << axis) & ((1 << D) - 1);
+                    let sign = if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+                    let slope = sign / lattice.spacing[axis];
+                    influences.centre_gradients[at][axis] +=
+                        weight * slope * product_mean(&sum[..], corner, others);
+                }
+                if rings {
+                    let all = (1 << D) - 1;
+                    influences.centre_hoop[at] += weight * product_mean(&sum[4..], corner, all);
+                }
+            }
+        });
+    }
+    Ok(())
+}
+
+/// Place of a node in a row of domains; `counts`: cells along each axis, one less than nodes.
+fn place_in_row<const D: usize>(counts: &[usize; D], index: [usize; D]) -> usize {
+    (0..D).rev().fold(0, |place, axis| place * (counts[axis] + 1) + index[axis])
+}
+
+/// Σ V Π_a N_a over the `axes` (bits), N_a = ξ_a at the upper end of axis a and 1 - ξ_a at the lower one, the
+/// ends those of `corner`.
+fn product_mean(moments: &[f64], corner: usize, axes: usize) -> f64 {
+    let (upper, lower) = (corner & axes, !corner & axes);
+    // Π (1 - ξ) over the lower ends is the alternating sum over their subsets.
+    let (mut sum, mut subset) = (0.0, lower);
+    loop {
+        let sign = if subset.count_ones() % 2 == 0 { 1.0 } else { -1.0 };
+        sum += sign * moments[upper | subset];
+        if subset == 0 {
+            return sum;
+        }
+        subset = (subset - 1) & lower;
+    }
 }

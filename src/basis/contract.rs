@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::{Points, rectangle_corners};
 
+use super::centre::{self, Moments, RowNodes};
 use super::{Influences, corner, cpdi1, cpdi2, gimp, mpm, radial, row};
 
 /// Basis functions of points: which nodes each touches, with S and its gradient. Everything after
@@ -51,14 +52,31 @@ pub trait Basis<const D: usize> {
         None
     }
 
-    /// Gradients of the cells, for F-bar ([`super::centre`]): one for each entry of `influences`, 1/m.
-    fn centre_gradients(
+    /// For F-bar: moments of this rank's points at the lowest node of each cell (local), which the
+    /// ranks then add up. Empty for a basis whose cells' points live on one rank. Without axisymmetry the
+    /// `influences` have no hoops.
+    fn cell_moments(
         &self,
         grid: &Grid<D>,
         points: &Points<D>,
         influences: &Influences<D>,
-    ) -> Result<Vec<[f64; D]>> {
-        let _ = (grid, points, influences);
+        rows: RowNodes<'_>,
+    ) -> Result<Vec<Moments>> {
+        let _ = (grid, points, influences, rows);
+        Ok(Vec::new())
+    }
+
+    /// For F-bar: fills the gradients of the cells ([`super::centre`]), and with axisymmetry their hoop rows, from the
+    /// sums of all ranks.
+    fn fill_cell_rows(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        rows: RowNodes<'_>,
+        sums: &[Moments],
+    ) -> Result<()> {
+        let _ = (grid, points, influences, rows, sums);
         Err(Error::Input(
             "method.locking = \"f-bar\" is for basis = \"mpm\" and basis = \"gimp\"".to_string(),
         ))
@@ -112,13 +130,16 @@ impl<const D: usize> Basis<D> for Mpm {
         true
     }
 
-    fn centre_gradients(
+    fn fill_cell_rows(
         &self,
         _: &Grid<D>,
         points: &Points<D>,
-        influences: &Influences<D>,
-    ) -> Result<Vec<[f64; D]>> {
-        Ok(super::centre::means(points, influences, &influences.gradients))
+        influences: &mut Influences<D>,
+        _: RowNodes<'_>,
+        _: &[Moments],
+    ) -> Result<()> {
+        centre::fill_from_points(points, influences);
+        Ok(())
     }
 
     fn make_rings(
@@ -156,13 +177,25 @@ impl<const D: usize> Basis<D> for Gimp {
         Some(rectangle_corners(points.position[p], points.half_length[p]))
     }
 
-    fn centre_gradients(
+    fn cell_moments(
         &self,
         grid: &Grid<D>,
         points: &Points<D>,
-        _: &Influences<D>,
-    ) -> Result<Vec<[f64; D]>> {
-        gimp::centre_gradients(grid, self.edge, points)
+        influences: &Influences<D>,
+        rows: RowNodes<'_>,
+    ) -> Result<Vec<Moments>> {
+        centre::moments_of_domains(grid, points, !influences.hoop.is_empty(), rows)
+    }
+
+    fn fill_cell_rows(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        rows: RowNodes<'_>,
+        sums: &[Moments],
+    ) -> Result<()> {
+        centre::fill_from_domains(grid, points, influences, rows, sums)
     }
 
     fn make_rings(

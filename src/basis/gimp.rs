@@ -83,26 +83,6 @@ pub(crate) fn map_points<const D: usize>(
     edge: GimpEdge,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
-    map::<D, false>(grid, edge, points)
-}
-
-/// The gradients at the centres of the cells that a domain overlaps, each weighted by its share of
-/// the domain, entry by entry of [`map_points`]. Along an axis a node takes half of the share of
-/// either cell beside it as its weight; its slope is constant in a cell, and stays.
-pub(crate) fn centre_gradients<const D: usize>(
-    grid: &Grid<D>,
-    edge: GimpEdge,
-    points: &Points<D>,
-) -> Result<Vec<[f64; D]>> {
-    Ok(map::<D, true>(grid, edge, points)?.gradients)
-}
-
-/// `CENTRES`: weights are taken at the middles of the cells, not of the overlaps.
-fn map<const D: usize, const CENTRES: bool>(
-    grid: &Grid<D>,
-    edge: GimpEdge,
-    points: &Points<D>,
-) -> Result<Influences<D>> {
     let lattice = lattice_of(grid)?;
     let mut influences = Influences::with_capacity(points.len(), 3usize.pow(D as u32));
     let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
@@ -113,7 +93,7 @@ fn map<const D: usize, const CENTRES: bool>(
             let reach = points.half_length[p][axis] / lattice.spacing[axis];
             let (cells, spacing) = (lattice.cells[axis], lattice.spacing[axis]);
             let end = (edge == GimpEdge::Published).then_some(cells);
-            fill::<CENTRES>(&mut lines[axis], spans[axis], centre, reach, spacing, end);
+            fill(&mut lines[axis], spans[axis], centre, reach, spacing, end);
         }
         push_row(lattice, &lines, &mut influences);
     }
@@ -136,9 +116,8 @@ pub(crate) fn populated_cells<const D: usize>(
 
 /// Fills `line` with the means of the hats over [centre - reach, centre + reach], in cells.
 /// `published`: the cells of the grid, where the hats of its outermost nodes fall to zero beyond it.
-/// `CENTRES`: the middle of a cell in the place of the overlap's.
 #[inline]
-pub(crate) fn fill<const CENTRES: bool>(
+pub(crate) fn fill(
     line: &mut Line,
     span: Span,
     centre: f64,
@@ -158,7 +137,7 @@ pub(crate) fn fill<const CENTRES: bool>(
         let edge = (last + 1) as f64;
         if span.first == 0 && low < -LINE_TOLERANCE {
             let share = low.max(-1.0).abs() * per_length;
-            let middle = if CENTRES { -0.5 } else { 0.5 * low.max(-1.0) };
+            let middle = 0.5 * low.max(-1.0);
             line.weights[0] += share * (1.0 + middle);
             line.slopes[0] += share / spacing;
             low = 0.0;
@@ -166,7 +145,7 @@ pub(crate) fn fill<const CENTRES: bool>(
         if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
             let beyond = (high - edge).min(1.0);
             let share = beyond * per_length;
-            let middle = if CENTRES { 0.5 } else { 0.5 * beyond };
+            let middle = 0.5 * beyond;
             line.weights[last + 1] += share * (1.0 - middle);
             line.slopes[last + 1] -= share / spacing;
             high = edge;
@@ -176,7 +155,7 @@ pub(crate) fn fill<const CENTRES: bool>(
         let start = if cell == 0 { low } else { cell as f64 };
         let end = if cell == last { high } else { (cell + 1) as f64 };
         let share = (end - start) * per_length;
-        let middle = if CENTRES { 0.5 } else { 0.5 * (start + end) - cell as f64 };
+        let middle = 0.5 * (start + end) - cell as f64;
         line.weights[cell] += share * (1.0 - middle);
         line.weights[cell + 1] += share * middle;
         line.slopes[cell] -= share / spacing;

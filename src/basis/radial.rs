@@ -17,7 +17,7 @@
 //! For `mpm` the domain is a point, and S = S° = N(x_p). A domain that reaches beyond the axis, by what
 //! its update is off, ends at the axis.
 
-use super::centre;
+use super::centre::Piece;
 use super::contract::Basis;
 use super::gimp::{self, spans};
 use super::product::{Line, for_each_index};
@@ -26,9 +26,8 @@ use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
-/// Makes the rows those of rings: fills `hoop`, and weighs those of `gimp` by the radius. With
-/// centres, the rows of F-bar have been filled by [`super::centre`] before. Error: a point that is not
-/// off the axis, by id and place.
+/// Makes the rows those of rings: fills `hoop`, and weighs those of `gimp` by the radius. Error: a
+/// point that is not off the axis, by id and place.
 pub fn make_rings<const D: usize>(
     grid: &Grid<D>,
     basis: &dyn Basis<D>,
@@ -36,9 +35,6 @@ pub fn make_rings<const D: usize>(
     influences: &mut Influences<D>,
 ) -> Result<()> {
     influences.hoop = vec![0.0; influences.nodes.len()];
-    if !influences.centre_gradients.is_empty() {
-        influences.centre_hoop = vec![0.0; influences.nodes.len()];
-    }
     basis.make_rings(grid, points, influences)
 }
 
@@ -56,10 +52,6 @@ pub(super) fn rings_of_points<const D: usize>(
             influences.hoop[at] = influences.weights[at] / radius;
         }
     }
-    if !influences.centre_hoop.is_empty() {
-        let hoops: Vec<[f64; 1]> = influences.hoop.iter().map(|hoop| [*hoop]).collect();
-        influences.centre_hoop = centre::means(points, influences, &hoops).into_flattened();
-    }
     Ok(())
 }
 
@@ -70,19 +62,14 @@ pub(super) fn rings_of_domains<const D: usize>(
 ) -> Result<()> {
     let lattice = lattice_of(grid)?;
     let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
-    let mut middles: [Line; D] = lines.clone();
     let mut radial = Radial::default();
-    let with_centres = !influences.centre_hoop.is_empty();
     for p in 0..points.len() {
         let spans = spans(grid, lattice, points, p)?;
         let (x, half) = (&points.position[p], &points.half_length[p]);
         for axis in 1..D {
             let (centre, spacing) = (lattice.scaled(axis, x[axis]), lattice.spacing[axis]);
             let reach = half[axis] / spacing;
-            gimp::fill::<false>(&mut lines[axis], spans[axis], centre, reach, spacing, None);
-            if with_centres {
-                gimp::fill::<true>(&mut middles[axis], spans[axis], centre, reach, spacing, None);
-            }
+            gimp::fill(&mut lines[axis], spans[axis], centre, reach, spacing, None);
         }
         let cells = spans[0].last - spans[0].first + 1;
         let ends = [(x[0] - half[0]).max(0.0), x[0] + half[0]];
@@ -115,14 +102,6 @@ pub(super) fn rings_of_domains<const D: usize>(
                 0 => radial.slopes[r] * across,
                 _ => radial.weights[r] * along(&lines, Some(a)),
             });
-            if with_centres {
-                let across = along(&middles, None);
-                influences.centre_hoop[at] = radial.centre_hoop[r] * across;
-                influences.centre_gradients[at] = std::array::from_fn(|a| match a {
-                    0 => radial.slopes[r] * across,
-                    _ => radial.centre_weights[r] * along(&middles, Some(a)),
-                });
-            }
             at += 1;
         });
         debug_assert_eq!(at, influences.row(p).end, "rows of gimp are those of its spans");
@@ -139,9 +118,7 @@ struct Radial {
     slopes: Vec<f64>,
     /// ∫ N dr / (r_c L), 1/m
     hoop: Vec<f64>,
-    /// N and N/r at the middles of the cells, weighted by their shares of the ring's volume
-    centre_weights: Vec<f64>,
-    centre_hoop: Vec<f64>,
+    pieces: Vec<Piece>,
 }
 
 impl Radial {
@@ -152,42 +129,47 @@ impl Radial {
         lattice: &Lattice<D>,
         first: usize,
         cells: usize,
-        [low, high]: [f64; 2],
+        ends: [f64; 2],
     ) {
-        for values in [
-            &mut self.weights,
-            &mut self.slopes,
-            &mut self.hoop,
-            &mut self.centre_weights,
-            &mut self.centre_hoop,
-        ] {
+        for values in [&mut self.weights, &mut self.slopes, &mut self.hoop] {
             values.clear();
             values.resize(cells + 1, 0.0);
         }
         let spacing = lattice.spacing[0];
-        let line = |node: usize| lattice.origin[0] + (first + node) as f64 * spacing;
-        let (length, middle) = (high - low, 0.5 * (low + high));
-        for cell in 0..cells {
-            let start = if cell == 0 { low } else { line(cell) };
-            let end = if cell + 1 == cells { high } else { line(cell + 1) };
-            let (piece, radius) = (end - start, 0.5 * (start + end));
-            // Share of the domain's area and of the ring's volume.
-            let plain = piece / length;
-            let share = plain * radius / middle;
-            // Place in the cell of the piece's middle and of its ring's centre of mass.
-            let at = (radius - line(cell)) / spacing;
-            let centre = at + piece * piece / (12.0 * radius * spacing);
-            let cell_radius = line(cell) + 0.5 * spacing;
+        self.pieces.clear();
+        pieces_of_rings(lattice, first, cells, ends, &mut self.pieces);
+        for (cell, piece) in self.pieces.iter().enumerate() {
+            let (share, centre, [plain, at]) = (piece.share, piece.place, piece.plain);
             for (node, n, n_plain, sign) in
                 [(cell, 1.0 - centre, 1.0 - at, -1.0), (cell + 1, centre, at, 1.0)]
             {
                 self.weights[node] += share * n;
                 self.slopes[node] += sign * share / spacing;
-                self.hoop[node] += plain * n_plain / middle;
-                self.centre_weights[node] += 0.5 * share;
-                self.centre_hoop[node] += 0.5 * share / cell_radius;
+                self.hoop[node] += plain * n_plain;
             }
         }
+    }
+}
+
+/// The parts of a ring's domain along the radius ([`super::centre`]); arguments as in [`Radial::fill`].
+pub(super) fn pieces_of_rings<const D: usize>(
+    lattice: &Lattice<D>,
+    first: usize,
+    cells: usize,
+    [low, high]: [f64; 2],
+    out: &mut Vec<Piece>,
+) {
+    let spacing = lattice.spacing[0];
+    let line = |node: usize| lattice.origin[0] + (first + node) as f64 * spacing;
+    let (length, middle) = (high - low, 0.5 * (low + high));
+    for cell in 0..cells {
+        let start = if cell == 0 { low } else { line(cell) };
+        let end = if cell + 1 == cells { high } else { line(cell + 1) };
+        let (length_here, radius) = (end - start, 0.5 * (start + end));
+        let plain = length_here / length;
+        let at = (radius - line(cell)) / spacing;
+        let place = at + length_here * length_here / (12.0 * radius * spacing);
+        out.push(Piece { share: plain * radius / middle, place, plain: [plain / middle, at] });
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::deck::model::MeshSource;
+use crate::deck::model::{MeshSource, stations};
 use crate::error::{Error, Result};
 
 use super::check::Draft;
@@ -20,12 +20,21 @@ impl<const D: usize> Mesh<D> {
     pub fn build(source: &MeshSource) -> Result<Self> {
         match source {
             MeshSource::File(path) => gmsh::read(path),
-            MeshSource::Box { min, max, cells, element } => {
+            MeshSource::Box { min, max, cells, stations, element } => {
                 let wrong = || input("generated box", "min, max and cells need one entry per axis");
                 let min = <[f64; D]>::try_from(min.as_slice()).map_err(|_| wrong())?;
                 let max = <[f64; D]>::try_from(max.as_slice()).map_err(|_| wrong())?;
                 let cells = <[usize; D]>::try_from(cells.as_slice()).map_err(|_| wrong())?;
-                box_mesh(min, max, cells, *element)
+                let mut mesh = box_draft(min, max, cells, *element)?;
+                for (axis, stations) in stations.iter().enumerate() {
+                    let lines = stations::lines(stations);
+                    let spacing = (max[axis] - min[axis]) / cells[axis] as f64;
+                    for place in &mut mesh.positions {
+                        let line = ((place[axis] - min[axis]) / spacing).round() as usize;
+                        place[axis] = lines[line];
+                    }
+                }
+                mesh.finish()
             }
             &MeshSource::Annulus { inner, outer, radial, around, element, grading } => {
                 annulus(inner, outer, [radial, around], element, grading)
@@ -47,6 +56,15 @@ pub fn box_mesh<const D: usize>(
     counts: [usize; D],
     element: Element,
 ) -> Result<Mesh<D>> {
+    box_draft(min, max, counts, element)?.finish()
+}
+
+fn box_draft<const D: usize>(
+    min: [f64; D],
+    max: [f64; D],
+    counts: [usize; D],
+    element: Element,
+) -> Result<Draft<D>> {
     const NAME: &str = "generated box";
     if element.dimension() != D {
         return Err(input(NAME, &format!("element does not fit a {D}-dimensional box")));
@@ -86,7 +104,7 @@ pub fn box_mesh<const D: usize>(
             cells.extend(corners.map(|c| node(c) as u32));
         }
     }
-    finish(NAME, element, positions, cells, node_sets)
+    Ok(draft(NAME, element, positions, cells, node_sets))
 }
 
 /// A disc of radius `outer` (m) with an elliptic hole of semi-axes `inner` (m) along x and y,
@@ -149,7 +167,7 @@ pub fn annulus<const D: usize>(
     }
     let ring = |ring: usize| (0..around).map(|s| (ring * around + s) as u32).collect();
     let node_sets = [("inner".to_string(), ring(0)), ("outer".to_string(), ring(radial))].into();
-    finish(NAME, element, positions, cells, node_sets)
+    draft(NAME, element, positions, cells, node_sets).finish()
 }
 
 /// Nodes and cells are 32-bit numbers, with room for six simplices per node.
@@ -160,13 +178,13 @@ fn check_size(name: &str, nodes: usize) -> Result<()> {
     Ok(())
 }
 
-fn finish<const D: usize>(
+fn draft<const D: usize>(
     name: &str,
     element: Element,
     positions: Vec<[f64; D]>,
     cells: Vec<u32>,
     node_sets: BTreeMap<String, Vec<u32>>,
-) -> Result<Mesh<D>> {
+) -> Draft<D> {
     Draft {
         name: name.to_string(),
         element,
@@ -177,5 +195,4 @@ fn finish<const D: usize>(
         node_sets,
         cell_sets: BTreeMap::new(),
     }
-    .finish()
 }

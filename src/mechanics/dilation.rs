@@ -1,14 +1,25 @@
-//! F-bar: dF_bar = (det dF_0 / det dF)^(1/D) dF, the point's distortion with the change of volume of
-//! its cells (de Souza Neto et al. 1996, IJSS 33:3277, eq. 8); in plane strain it acts in
-//! the plane only, where dF_zz = 1 stays. Rings (`ring.rs`) take all three directions.
+//! F-bar: dF_bar = (det dF_0 / det dF)^(1/n) dF, the point's distortion with the change of volume of
+//! its cells (de Souza Neto et al. 1996, IJSS 33:3277, eq. 8). In plane strain n = 2: it acts in
+//! the plane only, where dF_zz = 1 stays. In space and for rings (`ring.rs`) n = 3.
 //!
 //! The material sees dF_bar: b_e and tau follow from it. Gradients, positions, domains and volumes
-//! follow dF, so that sigma = tau / det F is integrated over the true volume. With L = d(dF) dF^-1:
-//! d(dF_bar) dF_bar^-1 = L + 1 (tr L_0 - tr L) / D. The part along L is the tangent of
-//! [`super::contribution`] at dF_bar, the rest one product per point: dtau for L = 1 times
-//! (tr L_0 - tr L) / D. Without a counterpart in the rows it makes the tangent unsymmetric.
+//! follow dF. The force is the derivative of the energy Σ V0 psi(dF_bar) by the nodes' displacements,
+//! so that it does as much work as the material stores and dissipates. With L = d(dF) dF^-1 it is
+//! d(dF_bar) dF_bar^-1 = L + 1 (tr L_0 - tr L) / n, hence
+//!
+//! f_a = V0 (tau g_a + pi r_a), r_a = (g_0a - g_a) / n, pi = Σ tau_dd over the n directions,
+//!
+//! g = dF^-T G of the point's gradients and g_0 = dF_0^-T G_0 of its cells'. The pressure thus acts on the
+//! cells' change of volume, as its mean over the cell would (mean dilatation: Nagtegaal et al. 1974,
+//! CMAME 4:153; Simo, Taylor and Pister 1985, CMAME 51:177). De Souza Neto et al. leave the second term
+//! out, and gain or lose energy. With d g_a = -L^T g_a the tangent is that of [`super::contribution`] and
+//!
+//! V ((R g_a) x r_b + r_a x (l g_b + kappa r_b) + pi/n (g_b x g_a - g_0b x g_0a)),
+//!
+//! R = dtau for L = 1, l : L = dpi, kappa = Σ R_dd: symmetric where the material's moduli are.
 
 use super::Increment;
+use super::tangent::Expansion;
 use crate::tensor::dense::{self, Square};
 use crate::tensor::spectral::ln_1p;
 
@@ -39,34 +50,95 @@ pub(crate) fn grown<const D: usize>(increment: &Square<D>, growth: f64) -> Squar
     grown
 }
 
-/// What F-bar adds to a point's tangent: K_aibk += (dS_a/dy_j) R_ij r_bk V.
+/// What F-bar adds to a point's force and tangent (see the top of this file), per volume of the frame.
+/// The hoop's parts are zero but for rings.
 #[derive(Debug, Clone, Copy)]
 pub struct Dilation<const D: usize> {
-    /// R_ij: change of T for a uniform expansion L = 1 of what the material sees, Pa.
-    pub rate: Square<D>,
+    /// R_ij and R_zz in the frame, l_kl and l_zz, kappa, pi; Pa.
+    pub moduli: Expansion<D>,
+    /// dy/dx of the frame y, with the hoop's
+    pub back: (Square<D>, f64),
+    /// 1/n
+    pub share: f64,
     /// dF^-1
-    here: Square<D>,
+    here: (Square<D>, f64),
     /// dF_0^-1
-    centre: Square<D>,
+    common: (Square<D>, f64),
+}
+
+/// Rows of a node in the current state, 1/m; the hoop's behind.
+#[derive(Debug, Clone, Copy)]
+pub struct Rows<const D: usize> {
+    /// g
+    pub own: ([f64; D], f64),
+    /// g_0
+    pub common: ([f64; D], f64),
+    /// r = (g_0 - g) / n, the hoops' along the radius
+    pub swelling: [f64; D],
 }
 
 impl<const D: usize> Dilation<D> {
     #[inline]
-    pub(crate) fn new(rate: Square<D>, increment: &Square<D>, centre: &Square<D>) -> Self {
-        let inverse = |h: &Square<D>| dense::inverse(&dense::plus_unit(h)).0;
-        Dilation { rate, here: inverse(increment), centre: inverse(centre) }
+    pub(crate) fn new(
+        moduli: Expansion<D>,
+        back: (Square<D>, f64),
+        share: f64,
+        [here, common]: [Increment<'_, D>; 2],
+    ) -> Self {
+        Dilation { moduli, back, share, here: inverse(here), common: inverse(common) }
     }
 
-    /// r_b = (dF_0^-T G_0b - dF^-T G_b) / D, 1/m, of a node's gradients G_b at the point and G_0b
-    /// of the cells.
+    /// From a node's gradients and hoop rows at the step's start, `own` at the point and `common` of its cells.
     #[inline]
-    pub fn row(&self, gradient: &[f64; D], centre: &[f64; D]) -> [f64; D] {
-        std::array::from_fn(|k| {
-            let mut sum = 0.0;
-            for m in 0..D {
-                sum += centre[m] * self.centre[m][k] - gradient[m] * self.here[m][k];
-            }
-            sum / D as f64
-        })
+    pub fn rows(&self, own: (&[f64; D], f64), common: (&[f64; D], f64)) -> Rows<D> {
+        let own = mapped(own, &self.here);
+        let common = mapped(common, &self.common);
+        let swelling = swelling(&own, &common, self.share);
+        Rows { own, common, swelling }
     }
+
+    /// c_b = l g_b + kappa r_b: change of pi by the node's displacement, Pa/m; `frame`: its rows in the frame.
+    #[inline]
+    pub fn change_of_trace(&self, frame: (&[f64; D], f64), swelling: &[f64; D]) -> [f64; D] {
+        let mut change = dense::apply(&self.moduli.onto, frame.0);
+        change[0] += self.moduli.hoop_onto * frame.1;
+        for (change, r) in change.iter_mut().zip(swelling) {
+            *change += self.moduli.own * r;
+        }
+        change
+    }
+}
+
+/// r = (g_0 - g) / n of rows in the current state.
+#[inline]
+pub fn swelling<const D: usize>(
+    own: &([f64; D], f64),
+    common: &([f64; D], f64),
+    share: f64,
+) -> [f64; D] {
+    let mut row: [f64; D] = std::array::from_fn(|k| share * (common.0[k] - own.0[k]));
+    row[0] += share * (common.1 - own.1);
+    row
+}
+
+/// dF^-1 of dF - 1
+#[inline]
+pub fn inverse<const D: usize>(increment: Increment<'_, D>) -> (Square<D>, f64) {
+    let block = dense::inverse(&dense::plus_unit(increment.block)).0;
+    (block, 1.0 / (1.0 + increment.hoop))
+}
+
+/// dF^-T of rows at the step's start: those of the current state.
+#[inline]
+pub fn mapped<const D: usize>(
+    (gradient, hoop): (&[f64; D], f64),
+    (inverse, hoop_inverse): &(Square<D>, f64),
+) -> ([f64; D], f64) {
+    let mut row = [0.0; D];
+    for (g, line) in gradient.iter().zip(inverse) {
+        for (sum, value) in row.iter_mut().zip(line) {
+            *sum += g * value;
+        }
+    }
+    (row, hoop * hoop_inverse)
 }

@@ -26,6 +26,7 @@ mod tests;
 
 pub use dilation::Dilation;
 pub use ring::{Hoop, ring_contribution};
+pub use tangent::Expansion;
 pub use update::BATCH;
 
 use nalgebra::Matrix3;
@@ -129,7 +130,7 @@ pub fn contribution<const D: usize>(
 }
 
 /// [`contribution`] with F-bar: `centre` is dF_0 - 1. The stress, its part of the tangent and the
-/// state are those of dF_bar, everything else that of dF.
+/// state are those of dF_bar; [`Dilation`] is what the force and the tangent have beside.
 #[inline]
 pub fn averaged_contribution<const D: usize>(
     frame: Frame,
@@ -140,8 +141,10 @@ pub fn averaged_contribution<const D: usize>(
     let update = update::update(start, (&dilation::averaged(increment, centre)).into());
     let placement = Placement::new(frame, start, &dense::plus_unit(increment), 1.0);
     let contribution = placement.contribution(&update);
-    let rate = tangent::expansion(&update, &placement.back, placement.scale);
-    let dilation = Dilation::new(rate, increment, centre);
+    let back = (placement.back, 1.0);
+    let moduli = tangent::expansion(&update, &back, placement.scale, D);
+    let both = [increment.into(), centre.into()];
+    let dilation = Dilation::new(moduli, back, 1.0 / D as f64, both);
     (contribution, dilation, update.state(&start.material))
 }
 

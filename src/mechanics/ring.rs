@@ -11,7 +11,7 @@
 
 use super::tangent;
 use super::update;
-use super::{Contribution, Increment, Placement, StepStart, StressState, dilation};
+use super::{Contribution, Dilation, Increment, Placement, StepStart, StressState, dilation};
 use crate::deck::model::Frame;
 use crate::tensor::dense::{self, Square};
 
@@ -28,38 +28,8 @@ pub struct Hoop<const D: usize> {
     pub onto: Square<D>,
     /// A_zzzz, Pa
     pub own: f64,
-    /// With F-bar the product that it adds.
-    pub swelling: Option<Swelling<D>>,
-}
-
-/// What F-bar adds to a ring's tangent: K_aibk += (g_aj R_ij + s_a δ_i0 R_zz) r_bk V.
-#[derive(Debug, Clone, Copy)]
-pub struct Swelling<const D: usize> {
-    /// R_ij and R_zz: change of T for an expansion L = 1 in all three directions, Pa.
-    pub rate: Square<D>,
-    pub hoop_rate: f64,
-    /// dF^-1, with the hoop's
-    here: (Square<D>, f64),
-    /// dF_0^-1
-    centre: (Square<D>, f64),
-}
-
-impl<const D: usize> Swelling<D> {
-    /// r_b = (dF_0^-T G_0b - dF^-T G_b + (s_0b / dF_0zz - s_b / dF_zz) e_r) / 3, 1/m, of a node's
-    /// gradients and hoop rows at the point and at the centres.
-    #[inline]
-    pub fn row(&self, own: (&[f64; D], f64), centre: (&[f64; D], f64)) -> [f64; D] {
-        std::array::from_fn(|k| {
-            let mut sum = 0.0;
-            for m in 0..D {
-                sum += centre.0[m] * self.centre.0[m][k] - own.0[m] * self.here.0[m][k];
-            }
-            if k == 0 {
-                sum += centre.1 * self.centre.1 - own.1 * self.here.1;
-            }
-            sum / 3.0
-        })
-    }
+    /// With F-bar what it adds.
+    pub dilation: Option<Dilation<D>>,
 }
 
 /// dF_bar - 1 of a ring, the hoop's last, from dF - 1 and dF_0 - 1. Not a number where a determinant
@@ -102,20 +72,11 @@ pub fn ring_contribution<const D: usize>(
     let stress = update.response.stress[2];
     let (from, onto) = tangent::coupling(&update, &placement.back, scale);
     let own = scale * back * (update.response.tangent[2][2] - stress);
-    let swelling = centre.map(|centre| {
-        let inverse = |h: Increment<'_, D>| {
-            (dense::inverse(&dense::plus_unit(h.block)).0, 1.0 / (1.0 + h.hoop))
-        };
-        let mut rate = tangent::expansion(&update, &placement.back, placement.scale);
-        // A_ijzz holds one factor dy/dx of the hoop that the rate is without.
-        for (row, more) in rate.iter_mut().zip(&from) {
-            for (rate, more) in row.iter_mut().zip(more) {
-                *rate += more / back;
-            }
-        }
-        let hoop_rate = scale * update.response.tangent[2].iter().sum::<f64>();
-        Swelling { rate, hoop_rate, here: inverse(increment), centre: inverse(centre) }
+    let dilation = centre.map(|centre| {
+        let back = (placement.back, back);
+        let moduli = tangent::expansion(&update, &back, placement.scale, 3);
+        Dilation::new(moduli, back, 1.0 / 3.0, [increment, centre])
     });
-    let hoop = Hoop { map, stress: scale * stress, from, onto, own, swelling };
+    let hoop = Hoop { map, stress: scale * stress, from, onto, own, dilation };
     (contribution, hoop, update.state(&start.material))
 }

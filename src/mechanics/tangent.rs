@@ -68,21 +68,52 @@ pub(crate) fn pull_back<const D: usize>(
     (frame_stress, tangent)
 }
 
-/// s H_jm dtau_im for L = 1 in the first `D` axes: sum_c c_ac n_a x (H n_a).
+/// What the stress does in a uniform expansion of the first n directions, and what their mean stress does
+/// in any strain; Pa per volume of the frame.
+#[derive(Debug, Clone, Copy)]
+pub struct Expansion<const D: usize> {
+    /// R_ij = s H_jm dtau_im for L = 1: sum_c c_ac n_a x (H n_a)
+    pub rate: Square<D>,
+    /// R_zz, with one factor dy/dx of the hoop
+    pub hoop_rate: f64,
+    /// l_kl = s H_ln dpi/dL_kn: sum_a c_ab n_b x (H n_b), pi = sum_a tau_a
+    pub onto: Square<D>,
+    /// l_zz, with one factor dy/dx of the hoop
+    pub hoop_onto: f64,
+    /// kappa: s dpi for L = 1
+    pub own: f64,
+    /// s pi
+    pub trace: f64,
+}
+
+/// In the first `directions` axes, 3 with the hoop; `back` is H, `scale` s.
 #[inline]
 pub(crate) fn expansion<const D: usize>(
     update: &Update,
-    back: &Square<D>,
+    back: &(Square<D>, f64),
     scale: f64,
-) -> Square<D> {
-    let mut rate = [[0.0; D]; D];
+    directions: usize,
+) -> Expansion<D> {
+    let moduli = &update.response.tangent;
+    let all = 0..directions;
+    let of_row = |a: usize| -> f64 { moduli[a][all.clone()].iter().sum::<f64>() * scale };
+    let of_column = |b: usize| -> f64 { all.clone().map(|a| moduli[a][b]).sum::<f64>() * scale };
+    let (mut rate, mut onto) = ([[0.0; D]; D], [[0.0; D]; D]);
     for a in 0..D {
         let here: [f64; D] = std::array::from_fn(|i| update.trial.axes[a][i]);
-        let there: [f64; D] = std::array::from_fn(|j| dot(&back[j], &here));
-        let modulus: f64 = update.response.tangent[a][..D].iter().sum();
-        add(&mut rate, scale * modulus, &here, &there);
+        let there: [f64; D] = std::array::from_fn(|j| dot(&back.0[j], &here));
+        add(&mut rate, of_row(a), &here, &there);
+        add(&mut onto, of_column(a), &here, &there);
     }
-    rate
+    let hoop = if directions > D { back.1 } else { 0.0 };
+    Expansion {
+        rate,
+        hoop_rate: hoop * of_row(2),
+        onto,
+        hoop_onto: hoop * of_column(2),
+        own: all.clone().map(of_row).sum(),
+        trace: scale * update.response.stress[all.clone()].iter().sum::<f64>(),
+    }
 }
 
 /// s_h H_jm dtau_im for L_zz = 1, and s_h H_ln dtau_zz for L_kn, `scale` s_h with the dy/dx of the

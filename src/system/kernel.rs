@@ -2,6 +2,7 @@
 //! products of a batch of points are summed in registers, tile by tile, and go straight into
 //! the sparse rows. The plain form is in `internal.rs`; a test compares the two.
 
+use crate::mechanics::dilation::{Dilation, Rows};
 use crate::mechanics::{Contribution, Hoop};
 use crate::tensor::fused::multiply_add;
 
@@ -23,8 +24,10 @@ pub(crate) struct Batch {
     nodes: usize,
     /// Columns of a row, filled up to whole tiles.
     stride: usize,
-    /// Rows of a point: one per axis, and with axisymmetry one for the hoop.
+    /// Rows of a point: one per axis, with axisymmetry one for the hoop, and with F-bar as many of its cells.
     depth: usize,
+    /// Rows of the point itself.
+    own: usize,
     points: usize,
     capacity: usize,
     /// g_aj: row (p, j), column a.
@@ -36,12 +39,14 @@ pub(crate) struct Batch {
 }
 
 impl Batch {
-    /// Starts a group of points on `nodes` nodes; `rings`: each has a hoop, too.
+    /// Starts a group of points on `nodes` nodes; `rings`: each has a hoop, too; `cells`: each has rows of
+    /// its cells.
     #[inline(always)]
-    pub fn start<const D: usize>(&mut self, nodes: usize, rings: bool) {
+    pub fn start<const D: usize>(&mut self, nodes: usize, rings: bool, cells: bool) {
         self.nodes = nodes;
         self.stride = (nodes * D).next_multiple_of(NARROW);
-        self.depth = D + usize::from(rings);
+        self.own = D + usize::from(rings);
+        self.depth = self.own * (1 + usize::from(cells));
         self.points = 0;
         self.capacity = (BATCH_VALUES / (D * self.depth * self.stride)).max(1);
         // Columns beyond the last node are never read back; they only have to exist.
@@ -94,29 +99,75 @@ impl Batch {
         }
     }
 
-    /// Adds the product g_aj R_ij r_bk to the block of the point pushed last: what its stress T
-    /// does with a scalar that depends on the nodes. `rate` is R V, `row` holds r, (node, axis).
+    /// Adds what F-bar does ([`Dilation`]) to the point pushed last. `frame`: gradients and hoop rows in the
+    /// frame, the latter empty but for rings; `rows`: those of the current state; `volume` in m3.
     #[inline(always)]
-    pub fn push_product<const D: usize, const FUSED: bool>(
+    pub fn push_dilation<const D: usize, const FUSED: bool>(
         &mut self,
-        rate: &[[f64; D]; D],
-        row: &[[f64; D]],
+        (gradients, hoops): (&[[f64; D]], &[f64]),
+        rows: &[Rows<D>],
+        dilation: &Dilation<D>,
+        volume: f64,
     ) {
-        let (stride, first) = (self.stride, (self.points - 1) * self.depth);
+        let (nodes, stride) = (self.nodes, self.stride);
+        let first = (self.points - 1) * self.depth;
+        let common = first + self.own;
         let plane = self.capacity * self.depth * stride;
-        for i in 0..D {
-            for j in 0..D {
-                let start = i * plane + (first + j) * stride;
-                let flux = &mut self.flux[start..start + self.nodes * D];
-                for (target, factors) in flux.iter_mut().zip(row.as_flattened()) {
-                    *target = multiply_add::<FUSED>(rate[i][j], *factors, *target);
+        for j in 0..D {
+            let line = &mut self.gradients[(common + j) * nodes..(common + j + 1) * nodes];
+            line.iter_mut().zip(rows).for_each(|(target, row)| *target = row.common.0[j]);
+        }
+        let rings = !hoops.is_empty();
+        if rings {
+            let line = &mut self.gradients[(common + D) * nodes..(common + D + 1) * nodes];
+            line.iter_mut().zip(rows).for_each(|(target, row)| *target = row.common.1);
+        }
+        let (moduli, back, share) = (&dilation.moduli, &dilation.back, dilation.share);
+        let pressure = moduli.trace * share * volume;
+        for (b, row) in rows.iter().enumerate() {
+            let hoop = hoops.get(b).copied().unwrap_or(0.0);
+            let change = dilation.change_of_trace((&gradients[b], hoop), &row.swelling);
+            let change = change.map(|c| c * share * volume);
+            let swelling = row.swelling.map(|r| r * volume);
+            for i in 0..D {
+                let at = |line: usize| i * plane + line * stride + b * D;
+                for j in 0..D {
+                    let turn = pressure * row.own.0[i];
+                    let own = &mut self.flux[at(first + j)..][..D];
+                    for k in 0..D {
+                        let mut sum = moduli.rate[i][j] * swelling[k] - back.0[j][i] * change[k];
+                        sum = multiply_add::<FUSED>(turn, back.0[j][k], sum);
+                        own[k] += sum;
+                    }
+                    let cells = &mut self.flux[at(common + j)..][..D];
+                    cells.fill(0.0);
+                    if i == j {
+                        cells.copy_from_slice(&change);
+                    }
+                    cells[j] -= pressure * row.common.0[i];
                 }
+                if !rings {
+                    continue;
+                }
+                let cells = at(common + D);
+                if i > 0 {
+                    self.flux[cells..cells + D].fill(0.0);
+                    continue;
+                }
+                let own = &mut self.flux[at(first + D)..][..D];
+                for k in 0..D {
+                    own[k] += moduli.hoop_rate * swelling[k] - back.1 * change[k];
+                }
+                own[0] += pressure * back.1 * row.own.1;
+                let cells = &mut self.flux[cells..cells + D];
+                cells.copy_from_slice(&change);
+                cells[0] -= pressure * row.common.1;
             }
         }
     }
 
     /// Adds the hoop of the point pushed last ([`Hoop`]), `rows` and `gradients` in the frame, `volume`
-    /// in m3. `swelling`: R_zz V and the row r of F-bar.
+    /// in m3.
     #[inline(always)]
     pub fn push_hoop<const D: usize, const FUSED: bool>(
         &mut self,
@@ -124,7 +175,6 @@ impl Batch {
         gradients: &[[f64; D]],
         hoop: &Hoop<D>,
         volume: f64,
-        swelling: Option<(f64, &[[f64; D]])>,
     ) {
         let (nodes, stride) = (self.nodes, self.stride);
         let first = (self.points - 1) * self.depth;
@@ -159,11 +209,6 @@ impl Batch {
                     target[k] = sum;
                 }
                 target[0] = multiply_add::<FUSED>(hoop.own * volume, *row, target[0]);
-            }
-            if let Some((rate, row)) = swelling {
-                for (target, factor) in flux.iter_mut().zip(row.as_flattened()) {
-                    *target = multiply_add::<FUSED>(rate, *factor, *target);
-                }
             }
         }
     }

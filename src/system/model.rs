@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::Contacts;
-use crate::deck::model::{Locking, Tangent};
+use crate::deck::model::Tangent;
 use crate::deck::{Deck, When};
 use crate::error::Result;
 use crate::ghost::stencil::Penalty;
@@ -56,9 +56,7 @@ impl<const D: usize> Model<D> {
     /// deck does not ask for the general path.
     pub fn symmetric(&self) -> bool {
         let deck = &self.deck;
-        deck.analysis.tangent == Tangent::Auto
-            && deck.method.locking == Locking::None
-            && self.symmetric
+        deck.analysis.tangent == Tangent::Auto && self.symmetric
     }
 
     /// Force of the deck's loads on each point, N. Collective. Error: one is not finite.

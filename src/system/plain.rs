@@ -4,6 +4,8 @@
 
 use crate::deck::model::Frame;
 use crate::mechanics::Increment;
+use crate::mechanics::dilation::{Dilation, Rows};
+use crate::tensor::dense;
 
 use super::numbering::Numbering;
 use super::pattern::Pattern;
@@ -50,8 +52,6 @@ pub fn assemble<const D: usize>(
                 .map(|(made, dilation)| (made, Some(dilation)))
         };
         let Some((made, dilation)) = made else { continue };
-        let dilate = |b: usize| dilation.map(|d| (d.rate, d.row(&gradients[b], &centres[b])));
-        let products: Vec<_> = (0..gradients.len()).map(dilate).collect();
         let mapped: Vec<[f64; D]> = gradients
             .iter()
             .map(|g| std::array::from_fn(|j| (0..D).map(|i| g[i] * made.gradient_map[i][j]).sum()))
@@ -65,10 +65,6 @@ pub fn assemble<const D: usize>(
                         made.stress[i][j] * mapped[a][j] * made.volume;
                     for b in 0..count {
                         for k in 0..D {
-                            if let Some((rate, row)) = &products[b] {
-                                block[((a * D + i) * count + b) * D + k] +=
-                                    mapped[a][j] * rate[i][j] * row[k] * made.volume;
-                            }
                             for l in 0..D {
                                 block[((a * D + i) * count + b) * D + k] += mapped[a][j]
                                     * made.tangent[i][j][k][l]
@@ -80,9 +76,51 @@ pub fn assemble<const D: usize>(
                 }
             }
         }
+        if let Some(dilation) = &dilation {
+            let frame = |a: usize| (mapped[a], 0.0);
+            let rows = |a: usize| dilation.rows((&gradients[a], 0.0), (&centres[a], 0.0));
+            dilate(dilation, made.volume, (nodes, frame, rows), force, &mut block);
+        }
         stiffness.add(numbering, pattern, nodes, &block);
     }
     health
+}
+
+/// What F-bar adds to force and block ([`mechanics::dilation`](crate::mechanics::dilation)), term by term.
+fn dilate<const D: usize>(
+    dilation: &Dilation<D>,
+    volume: f64,
+    (nodes, frame, rows): (&[u32], impl Fn(usize) -> ([f64; D], f64), impl Fn(usize) -> Rows<D>),
+    force: &mut [f64],
+    block: &mut [f64],
+) {
+    let (moduli, count) = (&dilation.moduli, nodes.len());
+    let pressure = moduli.trace * dilation.share;
+    for a in 0..count {
+        let (in_frame, of_a) = (frame(a), rows(a));
+        for i in 0..D {
+            force[nodes[a] as usize * D + i] += volume * moduli.trace * of_a.swelling[i];
+        }
+        for b in 0..count {
+            let (frame_b, of_b) = (frame(b), rows(b));
+            let change = dilation.change_of_trace((&frame_b.0, frame_b.1), &of_b.swelling);
+            for i in 0..D {
+                let hoop_force = if i == 0 { in_frame.1 * moduli.hoop_rate } else { 0.0 };
+                let stress = dense::dot(&moduli.rate[i], &in_frame.0) + hoop_force;
+                for k in 0..D {
+                    let turn = |of: &dyn Fn(&Rows<D>) -> ([f64; D], f64)| {
+                        let ((g_a, h_a), (g_b, h_b)) = (of(&of_a), of(&of_b));
+                        g_b[i] * g_a[k] + if i == 0 && k == 0 { h_a * h_b } else { 0.0 }
+                    };
+                    let turned = turn(&|rows| rows.own) - turn(&|rows| rows.common);
+                    block[((a * D + i) * count + b) * D + k] += volume
+                        * (stress * of_b.swelling[k]
+                            + of_a.swelling[i] * change[k]
+                            + pressure * turned);
+                }
+            }
+        }
+    }
 }
 
 /// A ring's force and dense block, entry (a, i, b, k), by B = (g_0, g_1, s): dF = Σ_b B_b u_b with the hoop
@@ -141,18 +179,16 @@ fn ring<const D: usize>(
                     if i == 0 && k == 0 {
                         sum += s_a * ring.own * s_b;
                     }
-                    if let (Some(swelling), Some(centres)) = (&ring.swelling, centres) {
-                        let own = (&gradients[b], hoops[b]);
-                        let r = swelling.row(own, (&centres[b], centre_hoops[b]))[k];
-                        sum += (0..D).map(|j| mapped(a, j) * swelling.rate[i][j] * r).sum::<f64>();
-                        if i == 0 {
-                            sum += s_a * swelling.hoop_rate * r;
-                        }
-                    }
                     block[((a * D + i) * count + b) * D + k] += sum * volume;
                 }
             }
         }
+    }
+    if let (Some(dilation), Some(centres)) = (&ring.dilation, centres) {
+        let frame = |a: usize| (std::array::from_fn(|j| mapped(a, j)), hoops[a] * ring.map);
+        let rows =
+            |a: usize| dilation.rows((&gradients[a], hoops[a]), (&centres[a], centre_hoops[a]));
+        dilate(dilation, volume, (nodes, frame, rows), force, &mut block);
     }
     Some(block)
 }

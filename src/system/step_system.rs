@@ -10,6 +10,7 @@ use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use super::terms::surface;
+use crate::basis::centre::{Moments, RowNodes};
 use crate::basis::contract::{self, Basis};
 use crate::basis::{Groups, Influences, radial};
 use crate::deck::model::{Locking, PointVolume, Symmetry};
@@ -114,10 +115,6 @@ impl<const D: usize> Discretisation<D> {
         if basis.of_one_cell() && coupling != Coupling::Matrix {
             face_points::choose_cells(world, grid, partition, points, &mut influences)?;
         }
-        if model.deck.method.locking == Locking::FBar {
-            let centres = basis.centre_gradients(grid, points, &influences);
-            influences.centre_gradients = world.fail_together(centres)?;
-        }
         if model.deck.analysis.symmetry == Symmetry::Axisymmetric {
             let turned = radial::make_rings(grid, basis, points, &mut influences);
             world.fail_together(turned)?;
@@ -156,6 +153,10 @@ impl<const D: usize> Discretisation<D> {
         };
 
         let group_nodes = world.fail_together(locals(&numbering, &groups.nodes))?;
+        if model.deck.method.locking == Locking::FBar {
+            let rows = RowNodes { groups: &groups, nodes: &group_nodes, count: numbering.len() };
+            fill_cell_rows(world, grid, basis, points, &mut influences, (rows, &numbering))?;
+        }
         let group_reaches: Vec<bool> = groups
             .node_offsets
             .windows(2)
@@ -251,6 +252,24 @@ impl<const D: usize> Discretisation<D> {
             .map(|(&coupling, &on_face)| !on_face && coupling <= threshold * largest)
             .collect()
     }
+}
+
+/// The rows of F-bar: means over the material of all ranks in each cell. Collective.
+fn fill_cell_rows<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    basis: &dyn Basis<D>,
+    points: &Points<D>,
+    influences: &mut Influences<D>,
+    (rows, numbering): (RowNodes<'_>, &Numbering),
+) -> Result<()> {
+    let mut sums = world.fail_together(basis.cell_moments(grid, points, influences, rows))?;
+    if !sums.is_empty() {
+        const COUNT: usize = size_of::<Moments>() / size_of::<f64>();
+        numbering.halo.reverse_add(world, sums.as_flattened_mut(), COUNT)?;
+        numbering.halo.forward(world, sums.as_flattened_mut(), COUNT)?;
+    }
+    world.fail_together(basis.fill_cell_rows(grid, points, influences, rows, &sums))
 }
 
 /// The populated cells and the nodes at them, numbered: all that is known of a step's system before

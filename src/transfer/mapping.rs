@@ -6,8 +6,9 @@
 use std::ops::Range;
 
 use crate::basis::Influences;
+use crate::mechanics::{Increment, dilation};
 use crate::system::numbering::Numbering;
-use crate::system::terms::stress::StepPoints;
+use crate::system::terms::stress::{StepPoints, displacement_gradient, hoop_increment};
 use crate::tensor::Square;
 use crate::tensor::dense;
 
@@ -17,6 +18,8 @@ pub struct Deformation<const D: usize> {
     pub blocks: Vec<Square<D>>,
     /// dF_zz - 1 of rings; empty without axisymmetry.
     pub hoops: Vec<f64>,
+    /// dF_0 - 1 of the points' cells, with the hoop's; empty without F-bar, and where no force needs it.
+    pub common: Vec<(Square<D>, f64)>,
 }
 
 /// Σ_p m S^T v (Ghost eq. 10), kg m/s.
@@ -52,7 +55,8 @@ pub fn add_momentum<const D: usize>(
 /// Σ_p S^T f - ∇S^T σ V (Ghost eq. 6), N, with σ V = τ V0. `external` is the force on each
 /// point, empty for none. `increments` holds dF - 1 since the gradients were computed, empty for
 /// none: the gradients are then those of the deformed state, ∇S dF^-1. Rings add -τ_zz V0 H / dF_zz
-/// along the radius.
+/// along the radius, F-bar adds what its pressure does on the change of volume of the cells
+/// ([`crate::mechanics::dilation`]).
 pub fn force<const D: usize>(
     step: StepPoints<'_, D>,
     external: &[[f64; D]],
@@ -74,6 +78,7 @@ pub fn add_force<const D: usize>(
 ) {
     let points = step.points;
     add_hoop_force(step, part.clone(), &increments.hoops, sums);
+    add_dilation_force(step, part.clone(), increments, sums);
     for p in part {
         let volume = points.volume_initial[p];
         let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
@@ -106,6 +111,7 @@ pub fn add_momentum_and_force<const D: usize>(
 ) {
     let points = step.points;
     add_hoop_force(step, part.clone(), &[], forces);
+    add_dilation_force(step, part.clone(), &Deformation::default(), forces);
     for p in part {
         let volume = points.volume_initial[p];
         let stress: Square<D> = dense::block(&points.kirchhoff_stress[p]);
@@ -142,6 +148,44 @@ fn add_hoop_force<const D: usize>(
         let rows = &step.influences.hoop[step.influences.row(p)];
         for (&node, row) in step.nodes_of(p).iter().zip(rows) {
             sums[node as usize][0] -= row * force;
+        }
+    }
+}
+
+/// -Σ_p V0 π r of F-bar ([`crate::mechanics::dilation`]).
+fn add_dilation_force<const D: usize>(
+    step: StepPoints<'_, D>,
+    part: Range<usize>,
+    increments: &Deformation<D>,
+    sums: &mut [[f64; D]],
+) {
+    let influences = step.influences;
+    if influences.centre_gradients.is_empty() {
+        return;
+    }
+    let rings = !influences.hoop.is_empty();
+    let directions = if rings { 3 } else { D };
+    let still = [[0.0; D]; D];
+    for p in part {
+        let stress = &step.points.kirchhoff_stress[p];
+        let trace: f64 = (0..directions).map(|d| stress[(d, d)]).sum();
+        let pressure = trace * step.points.volume_initial[p];
+        let hoop = increments.hoops.get(p).copied().unwrap_or(0.0);
+        let block = increments.blocks.get(p).unwrap_or(&still);
+        let here = dilation::inverse(Increment { block, hoop });
+        let (block, hoop) = increments.common.get(p).copied().unwrap_or((still, 0.0));
+        let common = dilation::inverse(Increment { block: &block, hoop });
+        for (&node, at) in step.nodes_of(p).iter().zip(influences.row(p)) {
+            let hoops = match rings {
+                true => [influences.hoop[at], influences.centre_hoop[at]],
+                false => [0.0; 2],
+            };
+            let own = dilation::mapped((&influences.gradients[at], hoops[0]), &here);
+            let cells = dilation::mapped((&influences.centre_gradients[at], hoops[1]), &common);
+            let row = dilation::swelling(&own, &cells, 1.0 / directions as f64);
+            for (sum, r) in sums[node as usize].iter_mut().zip(row) {
+                *sum -= pressure * r;
+            }
         }
     }
 }
@@ -295,7 +339,29 @@ pub fn displacement_gradients<const D: usize>(
             increment
         })
         .collect();
-    Deformation { blocks, hoops }
+    Deformation { blocks, hoops, common: Vec::new() }
+}
+
+/// dF_0 - 1 of each point's cells, with the hoop's; empty without F-bar.
+pub fn common_increments<const D: usize>(
+    step: StepPoints<'_, D>,
+    displacement: &[f64],
+) -> Vec<(Square<D>, f64)> {
+    let influences = step.influences;
+    if influences.centre_gradients.is_empty() {
+        return Vec::new();
+    }
+    let of_point = |p: usize| {
+        let (nodes, row) = (step.nodes_of(p), influences.row(p));
+        let nodal = |a: usize| -> [f64; D] {
+            let start = nodes[a] as usize * D;
+            std::array::from_fn(|i| displacement[start + i])
+        };
+        let block = displacement_gradient(&influences.centre_gradients[row.clone()], nodal);
+        let hoops = influences.centre_hoop.get(row).unwrap_or_default();
+        (block, hoop_increment(hoops, nodal))
+    };
+    (0..step.points.len()).map(of_point).collect()
 }
 
 #[cfg(test)]

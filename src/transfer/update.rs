@@ -18,7 +18,7 @@ use crate::parallel::World;
 use crate::points::Points;
 use crate::system::model::Model;
 use crate::system::numbering::Numbering;
-use crate::system::terms::stress::{StepPoints, displacement_gradient, hoop_increment};
+use crate::system::terms::stress::{StepPoints, displacement_gradient};
 use crate::tensor::dense;
 
 use super::mapping::{self, Deformation};
@@ -66,7 +66,7 @@ pub struct PointEnergies {
 pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64]) -> Increments<D> {
     let count = step.points.len();
     let mut made = Increments {
-        deformation: Deformation { blocks: Vec::with_capacity(count), hoops: Vec::new() },
+        deformation: Deformation { blocks: Vec::with_capacity(count), ..Deformation::default() },
         averaged: Deformation::default(),
         displacement: Vec::with_capacity(count),
         corners: Vec::new(),
@@ -103,25 +103,16 @@ pub fn averaged<const D: usize>(
     displacement: &[f64],
     deformation: &Deformation<D>,
 ) -> Deformation<D> {
-    let centres = &step.influences.centre_gradients;
     let mut made = Deformation::default();
-    if centres.is_empty() {
-        return made;
-    }
-    for (p, increment) in deformation.blocks.iter().enumerate() {
-        let (nodes, row) = (step.nodes_of(p), step.influences.row(p));
-        let nodal = |a: usize| -> [f64; D] {
-            let start = nodes[a] as usize * D;
-            std::array::from_fn(|i| displacement[start + i])
-        };
-        let centre = displacement_gradient(&centres[row.clone()], nodal);
+    let common = mapping::common_increments(step, displacement);
+    for ((own, centre), p) in deformation.blocks.iter().zip(&common).zip(0..) {
         let Some(&hoop) = deformation.hoops.get(p) else {
-            made.blocks.push(dilation::averaged(increment, &centre));
+            made.blocks.push(dilation::averaged(own, &centre.0));
             continue;
         };
-        let centre_hoop = hoop_increment(&step.influences.centre_hoop[row], nodal);
-        let own = Increment { block: increment, hoop };
-        let (block, hoop) = ring::averaged(own, Increment { block: &centre, hoop: centre_hoop });
+        let own = Increment { block: own, hoop };
+        let centre = Increment { block: &centre.0, hoop: centre.1 };
+        let (block, hoop) = ring::averaged(own, centre);
         made.blocks.push(block);
         made.hoops.push(hoop);
     }

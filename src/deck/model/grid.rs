@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use super::stations::Station;
+
 #[derive(Debug, Clone, PartialEq)]
 pub enum Grid {
     Lattice(LatticeGrid),
@@ -42,6 +44,8 @@ pub enum MeshSource {
         min: Vec<f64>,
         max: Vec<f64>,
         cells: Vec<usize>,
+        /// Places and distances of the grid lines of each axis; empty: equal cells.
+        stations: Vec<Vec<Station>>,
         element: Element,
     },
 }

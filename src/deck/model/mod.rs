@@ -22,6 +22,7 @@ mod grid;
 mod loads;
 mod method;
 mod results;
+pub mod stations;
 
 use std::path::PathBuf;
 

@@ -144,13 +144,15 @@ pub(super) fn grid(w: &mut Writer<'_>, deck: &Deck) {
             ]);
             w.line("grid", "generate", inline(&[("annulus", annulus)]));
         }
-        MeshSource::Box { min, max, cells, element } => {
-            let made = inline(&[
-                ("min", vector(min)),
-                ("max", vector(max)),
-                ("cells", counts(cells)),
-                ("element", quote(element.name())),
-            ]);
+        MeshSource::Box { min, max, cells, stations, element } => {
+            let mut keys = if stations.is_empty() {
+                vec![("min", vector(min)), ("max", vector(max)), ("cells", counts(cells))]
+            } else {
+                let axis = |axis: &Vec<[f64; 2]>| array(axis.iter().map(|pair| vector(pair)));
+                vec![("spacing", array(stations.iter().map(axis)))]
+            };
+            keys.push(("element", quote(element.name())));
+            let made = inline(&keys);
             w.line("grid", "generate", inline(&[("box", made)]));
         }
     }

@@ -168,7 +168,7 @@ pub const SECTIONS: &[Section] = &[
                 "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none).")
                 .read_by(&[GIMP, QUASI_STATIC]),
             key("locking", Choice(Locking::NAMES), Default("\"none\""),
-                "f-bar: stresses from dF with the change of volume of the cells that a point touches (mpm: the mean of their points; gimp: at their centres), for Poisson's ratios near 0.5 and plastic flow without change of volume (bases mpm and gimp). The tangent is then unsymmetric. Triangles and tetrahedra gain nothing.")
+                "f-bar: stresses from dF with the change of volume of the cells that a point touches (the mean over the material in each of them), for Poisson's ratios near 0.5 and plastic flow without change of volume (bases mpm and gimp). The force is the derivative of the energy: nothing is gained or lost, and the tangent is symmetric where the materials' are. Triangles and tetrahedra gain nothing.")
                 .read_by(&[LOADED]),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
                 "State in which equilibrium is written (Lagrangian §3-5).")
@@ -268,11 +268,16 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "grid.generate.box",
         header: "grid.generate.box",
-        doc: "An axis-aligned box of equal elements.",
+        doc: "An axis-aligned box: of equal elements by min, max and cells, or by spacing.",
         keys: &[
-            key("min", Vector, Required, "Lower corner.").unit("m"),
-            key("max", Vector, Required, "Upper corner.").unit("m"),
-            key("cells", Counts, Required, "Boxes per axis.").range(at_least(1.0)),
+            key("min", Vector, Optional("or spacing"), "Lower corner.").unit("m"),
+            key("max", Vector, Optional("or spacing"), "Upper corner.").unit("m"),
+            key("cells", Counts, Optional("or spacing"), "Boxes per axis.").range(at_least(1.0)),
+            key("spacing", Special("for each axis an array of pairs [place, spacing there]"),
+                Optional("or min, max and cells"),
+                "Lines that lie closer where it matters: for each axis places from one end of the box to the \
+                 other, a line through each, and the spacing of the lines there; between two places it \
+                 changes linearly.").unit("m"),
             key("element", Choice(Element::NAMES), Optional("quad4 in 2D, hex8 in 3D"), "Element."),
         ],
     },

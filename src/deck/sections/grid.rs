@@ -5,10 +5,11 @@ use std::path::Path;
 use crate::deck::model::{
     Basis, BodySource, Boundary, Deck, Element, Grid, LatticeGrid, MeshGrid, MeshMotion,
     MeshSource, Method, Place, Seeding,
+    stations::{self, Station},
 };
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
-use crate::deck::schema::{AXES, POSITIVE};
+use crate::deck::schema::{ANY, AXES, POSITIVE};
 use crate::deck::tree::Value;
 
 /// Node numbers travel as 64-bit floats too, which hold whole numbers up to here.
@@ -163,9 +164,22 @@ fn annulus_of(table: &Table<'_>) -> Got<MeshSource> {
 }
 
 fn box_of(table: &Table<'_>) -> Got<(MeshSource, usize)> {
-    let dimension = dimension_of(table, &["min", "max", "cells"])?;
-    let (min, max) = super::shapes::corners(table, dimension, false)?;
-    let cells = table.counts_if("cells", dimension)?;
+    let graded = table.given("spacing");
+    let dimension =
+        dimension_of(table, if graded { &["spacing"] } else { &["min", "max", "cells"] })?;
+    let (min, max, cells, stations) = if graded {
+        table.refuse(&["min", "max", "cells"], "only without spacing, which tells them")?;
+        let axes = stations_of(table, dimension)?;
+        let end = |last: bool| {
+            axes.iter().map(|axis| axis[if last { axis.len() - 1 } else { 0 }][0]).collect()
+        };
+        let cells = axes.iter().map(|axis| stations::lines(axis).len() - 1).collect();
+        (end(false), end(true), cells, axes)
+    } else {
+        let (min, max) = super::shapes::corners(table, dimension, false)?;
+        let cells = table.counts_if("cells", dimension)?;
+        (min, max, cells.ok_or_else(|| table.missing("cells", ""))?, Vec::new())
+    };
     let allowed = if dimension == 2 {
         [Element::Quad4, Element::Tri3]
     } else {
@@ -176,8 +190,35 @@ fn box_of(table: &Table<'_>) -> Got<(MeshSource, usize)> {
     } else {
         allowed[0]
     };
-    let cells = cells.ok_or_else(|| table.missing("cells", ""))?;
-    Ok((MeshSource::Box { min, max, cells, element }, dimension))
+    Ok((MeshSource::Box { min, max, cells, stations, element }, dimension))
+}
+
+/// For each axis at least two pairs of a place and the spacing there; places ascend.
+fn stations_of(table: &Table<'_>, dimension: usize) -> Got<Vec<Vec<Station>>> {
+    let node = table.node("spacing").ok_or_else(|| table.missing("spacing", ""))?;
+    let Value::Array(axes) = &node.value else { return Err(table.wrong("spacing", node)) };
+    let mut made = Vec::with_capacity(dimension);
+    for axis in axes {
+        let Value::Array(pairs) = &axis.value else { return Err(table.wrong("spacing", axis)) };
+        let mut stations: Vec<Station> = Vec::with_capacity(pairs.len());
+        for pair in pairs {
+            match &pair.value {
+                Value::Array(items) if items.len() == 2 => stations.push([
+                    table.number_from("spacing", &items[0], ANY)?,
+                    table.number_from("spacing", &items[1], POSITIVE)?,
+                ]),
+                _ => return Err(table.wrong("spacing", pair)),
+            }
+        }
+        if stations.len() < 2 || stations.windows(2).any(|two| !(two[1][0] > two[0][0])) {
+            return Err(table.problem(
+                "spacing",
+                "expected two or more pairs [place, spacing] for each axis, places ascending",
+            ));
+        }
+        made.push(stations);
+    }
+    Ok(made)
 }
 
 fn motion_of(table: &Table<'_>, dimension: usize) -> Got<MeshMotion> {

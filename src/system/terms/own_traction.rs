@@ -34,9 +34,9 @@ pub fn on_area<const D: usize>(
         match made {
             None => (None, Vec::new()),
             Some((contribution, dilation)) => {
-                let rate = dense::apply(&dilation.rate, area);
+                let rate = dense::apply(&dilation.moduli.rate, area);
                 let of_node = |(g, c): (&[f64; D], &[f64; D])| -> Square<D> {
-                    let row = dilation.row(g, c);
+                    let row = dilation.rows((g, 0.0), (c, 0.0)).swelling;
                     std::array::from_fn(|i| row.map(|r| rate[i] * r))
                 };
                 (Some(contribution), gradients.iter().zip(centres).map(of_node).collect())

@@ -6,6 +6,7 @@ use std::ops::Range;
 use crate::basis::{Groups, Influences};
 use crate::deck::model::{Frame, PointVolume};
 use crate::material::{Material, local};
+use crate::mechanics::dilation::Rows;
 use crate::mechanics::{self, Contribution, Dilation, Hoop, Increment, StepStart, StressState};
 use crate::points::Points;
 use crate::tensor::dense;
@@ -101,8 +102,11 @@ impl<const D: usize> Term<D> for Stress<'_, D> {
                 around.iter().zip(hoops).map(|(&node, hoop)| moved[node as usize] * hoop).sum();
             let strain = strain + turned + points.elastic_excess[p].norm();
             let force = modulus * strain * points.volume(p).abs();
-            for (&node, gradient) in around.iter().zip(gradients) {
-                size[node as usize] += force * norm(gradient);
+            let cells = step.influences.centre_gradients.get(step.influences.row(p));
+            for rows in [Some(gradients), cells].into_iter().flatten() {
+                for (&node, gradient) in around.iter().zip(rows) {
+                    size[node as usize] += force * norm(gradient);
+                }
             }
             for (&node, hoop) in around.iter().zip(hoops) {
                 size[node as usize] += force * hoop;
@@ -179,9 +183,10 @@ struct Workspace<const D: usize> {
     displacement: Vec<[f64; D]>,
     force: Vec<[f64; D]>,
     gradients: Vec<[f64; D]>,
-    /// Of rings: hoop rows in the frame, and the row of F-bar.
+    /// Of rings: hoop rows in the frame.
     hoop: Vec<f64>,
-    swelling: Vec<[f64; D]>,
+    /// With F-bar: rows of the current state.
+    rows_now: Vec<Rows<D>>,
     /// Address and width of each node's scalar rows.
     rows: Vec<(usize, usize)>,
     batch: Batch,
@@ -201,7 +206,7 @@ impl<const D: usize> Task<'_, D> {
             force: Vec::new(),
             gradients: Vec::new(),
             hoop: Vec::new(),
-            swelling: Vec::new(),
+            rows_now: Vec::new(),
             rows: Vec::new(),
             batch: Batch::default(),
         };
@@ -217,7 +222,8 @@ impl<const D: usize> Task<'_, D> {
             work.force.clear();
             work.force.resize(nodes.len(), [0.0; D]);
             let rings = !self.step.influences.hoop.is_empty();
-            work.batch.start::<D>(nodes.len(), rings);
+            let cells = !self.step.influences.centre_gradients.is_empty();
+            work.batch.start::<D>(nodes.len(), rings, cells);
             if let Some(matrix) = stiffness.as_deref_mut() {
                 self.find_rows(nodes, matrix, &mut work.rows);
             }
@@ -292,14 +298,10 @@ impl<const D: usize> Task<'_, D> {
             let made = respond_averaged(step, self.frame, p, [&increment, &centre], health);
             let Some((contribution, dilation)) = made else { return };
             self.spread::<FUSED>(gradients, &contribution, work, with_block);
-            if with_block {
-                let rows = gradients.iter().zip(centres);
-                work.gradients.clear();
-                work.gradients.extend(rows.map(|(g, centre)| dilation.row(g, centre)));
-                let rate = dilation.rate.map(|row| row.map(|r| r * contribution.volume));
-                work.batch.push_product::<D, FUSED>(&rate, &work.gradients);
-            }
-            return;
+            work.hoop.clear();
+            let rows =
+                gradients.iter().zip(centres).map(|(own, common)| ((own, 0.0), (common, 0.0)));
+            return self.dilate::<FUSED>(rows, &dilation, contribution.volume, work, with_block);
         }
         let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
         self.spread::<FUSED>(gradients, &contribution, work, with_block);
@@ -335,20 +337,39 @@ impl<const D: usize> Task<'_, D> {
         for (row, force) in work.hoop.iter().zip(&mut work.force) {
             force[0] = multiply_add::<FUSED>(hoop.stress * volume, *row, force[0]);
         }
-        if !with_block {
-            return;
+        if with_block {
+            work.batch.push_hoop::<D, FUSED>(&work.hoop, &work.gradients, &hoop, volume);
         }
-        work.swelling.clear();
-        if let Some(swelling) = &hoop.swelling {
-            let of_node =
-                |a: usize| swelling.row((&gradients[a], rows[a]), (&centres[a], hoops[1][a]));
-            work.swelling.extend((0..gradients.len()).map(of_node));
-            let rate = swelling.rate.map(|row| row.map(|r| r * volume));
-            work.batch.push_product::<D, FUSED>(&rate, &work.swelling);
+        if let Some(dilation) = &hoop.dilation {
+            let rows = gradients.iter().zip(hoops[0].iter().copied());
+            let common = centres.iter().zip(hoops[1].iter().copied());
+            self.dilate::<FUSED>(rows.zip(common), dilation, volume, work, with_block);
         }
-        let swelling =
-            hoop.swelling.map(|swelling| (swelling.hoop_rate * volume, &work.swelling[..]));
-        work.batch.push_hoop::<D, FUSED>(&work.hoop, &work.gradients, &hoop, volume, swelling);
+    }
+
+    /// What F-bar adds to the force and, with the block, to the tangent of a point; `rows`: of each node
+    /// those of the point and of its cells, with the hoops'.
+    #[inline(always)]
+    fn dilate<'r, const FUSED: bool>(
+        &self,
+        rows: impl Iterator<Item = ((&'r [f64; D], f64), (&'r [f64; D], f64))>,
+        dilation: &Dilation<D>,
+        volume: f64,
+        work: &mut Workspace<D>,
+        with_block: bool,
+    ) {
+        work.rows_now.clear();
+        work.rows_now.extend(rows.map(|(own, common)| dilation.rows(own, common)));
+        let pressure = dilation.moduli.trace * volume;
+        for (row, force) in work.rows_now.iter().zip(&mut work.force) {
+            for (sum, r) in force.iter_mut().zip(&row.swelling) {
+                *sum = multiply_add::<FUSED>(pressure, *r, *sum);
+            }
+        }
+        if with_block {
+            let frame = (&work.gradients[..], &work.hoop[..]);
+            work.batch.push_dilation::<D, FUSED>(frame, &work.rows_now, dilation, volume);
+        }
     }
 
     /// Force and, with the block, the tangent A of a point.
