@@ -29,4 +29,5 @@ impl Error {
     }
 }
 
+/// The outcome of what can fail in a run.
 pub type Result<T> = std::result::Result<T, Error>;

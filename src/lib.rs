@@ -30,6 +30,8 @@
 //! | `input.toml` | [`deck`] |
 //! | files that a user names, opened with care | [`input_file`] |
 
+#![deny(missing_docs)]
+
 pub mod amg;
 pub mod analysis;
 pub mod basis;

@@ -16,7 +16,9 @@ use crate::petsc::{Index, Ksp, Matrix, agree};
 pub struct Hierarchy {
     /// The matrix A itself. That of the finest level is its symmetric part, rounded.
     pub exact: BlockProduct<f64>,
+    /// From the finest to the last but one.
     pub levels: Vec<Smoothed>,
+    /// The last.
     pub coarsest: CoarsestRows,
 }
 
@@ -33,14 +35,21 @@ pub struct Smoothed {
 /// This rank's rows of the last level, compressed: global columns, ascending.
 #[derive(Debug, Default)]
 pub struct CoarsestRows {
+    /// Unknowns per node.
     pub block: usize,
+    /// Row r is `offsets[r]..offsets[r + 1]`.
     pub offsets: Vec<Index>,
+    /// Global scalar columns.
     pub columns: Vec<Index>,
+    /// Entry by entry.
     pub values: Vec<f64>,
 }
 
 /// A problem whose solver may have a preconditioner of type `mg`.
 pub trait Levelled {
+    /// Those under its solver.
+    fn levels(&mut self) -> &mut Levels;
+
     /// Levels for the values that the matrix has. `None`: there are none for it.
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>>;
 
@@ -83,6 +92,18 @@ impl Levels {
     /// serve on, renews what the finest multiplies by. Nothing is done where the preconditioner is
     /// another. `earlier`: solves with these equations before. Collective.
     pub fn prepare(
+        problem: &mut impl Levelled,
+        solver: &Ksp,
+        matrix: &mut Matrix,
+        earlier: usize,
+    ) -> Result<()> {
+        let mut levels = std::mem::take(problem.levels());
+        let outcome = levels.renew(problem, solver, matrix, earlier);
+        *problem.levels() = levels;
+        outcome
+    }
+
+    fn renew(
         &mut self,
         problem: &mut impl Levelled,
         solver: &Ksp,

@@ -9,6 +9,7 @@ use crate::tensor::fused::Block;
 /// The nodes of a level: owned ones first, then ghosts, ascending by global number.
 #[derive(Debug, Default)]
 pub struct Nodes {
+    /// Nodes of this rank; those of other ranks follow.
     pub owned: usize,
     /// Global number of each local node; owned ones are consecutive.
     pub global: Vec<Index>,
@@ -52,8 +53,11 @@ pub trait Rows<const K: usize> {
 /// Rows with values of their own.
 #[derive(Debug, Default)]
 pub struct BlockCsr<const K: usize> {
+    /// Row r is `offsets[r]..offsets[r + 1]`.
     pub offsets: Vec<usize>,
+    /// Local nodes of the columns.
     pub columns: Vec<u32>,
+    /// A block for each column.
     pub values: Vec<Block<K, K>>,
 }
 

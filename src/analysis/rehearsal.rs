@@ -178,10 +178,7 @@ impl<const D: usize> NewtonProblem for Chain<D> {
     }
 
     fn prepare_solver(&mut self, solver: &Ksp, matrix: &mut Matrix, earlier: usize) -> Result<()> {
-        let mut levels = std::mem::take(&mut self.levels);
-        let outcome = levels.prepare(self, solver, matrix, earlier);
-        self.levels = levels;
-        outcome
+        Levels::prepare(self, solver, matrix, earlier)
     }
 
     fn record_solve(&mut self, iterations: usize, tolerance: f64) {
@@ -190,6 +187,10 @@ impl<const D: usize> NewtonProblem for Chain<D> {
 }
 
 impl<const D: usize> Levelled for Chain<D> {
+    fn levels(&mut self) -> &mut Levels {
+        &mut self.levels
+    }
+
     fn hierarchy(&mut self, _matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         let mut exact = BlockProduct::symmetric::<D>(BLOCKS, Vec::new(), 3 * BLOCKS);
         exact.fill::<D>(push::<D>);

@@ -68,6 +68,7 @@ impl Trials {
         };
     }
 
+    /// Puts the pause into a checkpoint.
     pub fn save(&self, state: &mut RunState) {
         state.set_count("solver.pause", self.pause);
     }

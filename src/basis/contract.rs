@@ -1,12 +1,28 @@
 //! `trait Basis`: what basis functions owe to the program.
 
-use crate::deck::model::{self, GimpEdge};
+use crate::deck::model::{self, DomainUpdate, GimpEdge};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::points::{Points, rectangle_corners};
+use crate::tensor::dense;
 
 use super::centre::{self, Moments, RowNodes};
-use super::{Influences, corner, cpdi1, cpdi2, gimp, mpm, radial, row};
+use super::{Influences, corner, cpdi1, cpdi2, domain, gimp, mpm, radial, row};
+
+/// A step as the domains of the points see it.
+pub struct DomainStep<'a, const D: usize> {
+    /// The grid of the step, and that of the next.
+    pub grids: [&'a Grid<D>; 2],
+    /// dF - 1 of each point.
+    pub increments: &'a [[[f64; D]; D]],
+    /// Displacement of each point, m.
+    pub moved: &'a [[f64; D]],
+    /// Displacement of a node, m; zero where no equation lives. It is asked only for nodes in the
+    /// point's own row of [`Basis::map_points`].
+    pub nodal: &'a dyn Fn(usize) -> [f64; D],
+    /// The points are rings: axisymmetry.
+    pub rings: bool,
+}
 
 /// Basis functions of points: which nodes each touches, with S and its gradient. Everything after
 /// the influences is the same code for all of them.
@@ -50,6 +66,43 @@ pub trait Basis<const D: usize> {
     fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
         let _ = (points, p);
         None
+    }
+
+    /// Whether a step can leave a domain that is of no use: [`Self::check_domain`] is asked then.
+    fn domains_deform(&self) -> bool {
+        false
+    }
+
+    /// Where the step takes the corners of point `p`'s domain, m, for domains that carry them. `hint`:
+    /// a cell near the first corner; left at that of the last. Error: the step turns the domain over
+    /// or carries it out of the grid.
+    fn check_domain(
+        &self,
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>> {
+        let _ = (step, points, p, hint);
+        Ok(None)
+    }
+
+    /// Updates `points.half_length` at the end of a step by the `rule` of the deck
+    /// ([`super::domain`]): after `deformation_gradient` and the carried corners have become those of
+    /// the step's end, while `position` and `half_length` are still those of its start. Returns how
+    /// many domains had outgrown the stretch of their points, which are put back to it. The default is
+    /// that of points without domains.
+    ///
+    /// Errors: a half length that is zero or not finite, and det F <= 0 where its root is needed,
+    /// with the point's id and position.
+    fn update_domains(
+        &self,
+        rule: DomainUpdate,
+        step: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        let _ = rule;
+        domain::update_cubes(points, step.rings)
     }
 
     /// For F-bar: moments of this rank's points at the lowest node of each cell (local), which the
@@ -177,6 +230,15 @@ impl<const D: usize> Basis<D> for Gimp {
         Some(rectangle_corners(points.position[p], points.half_length[p]))
     }
 
+    fn update_domains(
+        &self,
+        rule: DomainUpdate,
+        step: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_rectangles(rule, step, points)
+    }
+
     fn cell_moments(
         &self,
         grid: &Grid<D>,
@@ -233,6 +295,32 @@ impl<const D: usize> Basis<D> for Cpdi1 {
     fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
         Some(cpdi1::corner_positions(points, p))
     }
+
+    fn domains_deform(&self) -> bool {
+        true
+    }
+
+    fn check_domain(
+        &self,
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>> {
+        let increment = dense::plus_unit(&step.increments[p]);
+        cpdi1::check_step(step.grids[1], points, p, &increment, &step.moved[p], hint)?;
+        Ok(None)
+    }
+
+    fn update_domains(
+        &self,
+        _: DomainUpdate,
+        _: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_extents(points, |points, p| cpdi1::corner_positions(points, p));
+        Ok(0)
+    }
 }
 
 struct Cpdi2;
@@ -258,5 +346,29 @@ impl<const D: usize> Basis<D> for Cpdi2 {
 
     fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
         Some(points.corners[p])
+    }
+
+    fn domains_deform(&self) -> bool {
+        true
+    }
+
+    fn check_domain(
+        &self,
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>> {
+        cpdi2::moved_corners(step.grids, points, p, hint, &step.nodal).map(Some)
+    }
+
+    fn update_domains(
+        &self,
+        _: DomainUpdate,
+        _: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_extents(points, |points, p| points.corners[p]);
+        Ok(0)
     }
 }

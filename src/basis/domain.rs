@@ -17,75 +17,77 @@
 
 use nalgebra::Matrix3;
 
+use super::contract::DomainStep;
 use super::gimp::spans;
 use super::lattice_of;
-use crate::deck::model::{Basis, DomainUpdate};
+use crate::deck::model::DomainUpdate;
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 use crate::tensor::dense;
 use crate::tensor::spectral::square_root;
 
-/// Updates `points.half_length` at the end of a step: after `deformation_gradient`, and the corners
-/// of `cpdi2`, have become those of the step's end, while `position` and `half_length` are still
-/// those of its start.
-///
-/// `increments` holds dF, one for each point (only read, and else may be empty, for
-/// `normal-incremental`), `displacement` gives the step's nodal displacement, m, zero where no equation lives. It is asked only for nodes in the
-/// point's own row of [`map_points`](super::map_points) (read for `corners`).
-/// Returns how many domains of `corners` had outgrown the stretch of their points, which are put
-/// back to it.
-///
-/// Errors: a half length that is zero or not finite, and det F <= 0 where its root is needed,
-/// with the point's id and position.
-pub fn update_domains<const D: usize>(
-    grid: &Grid<D>,
-    basis: Basis,
-    rule: DomainUpdate,
+/// Half lengths of points without domains: half the side of a cube of the point's volume, or, with
+/// `rings`, of a square of the section's area A = V0 det F / (2π X F_zz).
+pub fn update_cubes<const D: usize>(points: &mut Points<D>, rings: bool) -> Result<usize> {
+    for p in 0..points.len() {
+        if rings {
+            points.half_length[p] = [0.5 * points.section(p).sqrt(); D];
+            continue;
+        }
+        let new = [0.5 * root::<D>(points.volume(p)); D];
+        require_sound(points, p, DomainUpdate::None, new)?;
+        points.half_length[p] = new;
+    }
+    Ok(0)
+}
+
+/// Half lengths of domains whose `corners` follow the deformation by themselves.
+pub fn update_extents<const D: usize>(
     points: &mut Points<D>,
-    increments: &[Matrix3<f64>],
-    displacement: &dyn Fn(usize) -> [f64; D],
+    corners: impl Fn(&Points<D>, usize) -> [[f64; D]; 8],
+) {
+    for p in 0..points.len() {
+        points.half_length[p] = half_extent(&corners(points, p));
+    }
+}
+
+/// Half lengths of rectangular domains by the deck's rule.
+pub fn update_rectangles<const D: usize>(
+    rule: DomainUpdate,
+    step: &DomainStep<'_, D>,
+    points: &mut Points<D>,
 ) -> Result<usize> {
     let mut overgrown = 0;
-    if matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
-        for p in 0..points.len() {
-            let corners = match basis {
-                Basis::Cpdi1 => super::cpdi1::corner_positions(points, p),
-                _ => points.corners[p],
-            };
-            points.half_length[p] = half_extent(&corners);
-        }
-        return Ok(overgrown);
-    }
-    if rule == DomainUpdate::NormalIncremental && basis == Basis::Gimp {
-        assert_eq!(increments.len(), points.len(), "one increment for each point");
+    if rule == DomainUpdate::NormalIncremental {
+        assert_eq!(step.increments.len(), points.len(), "one increment for each point");
     }
     for p in 0..points.len() {
         let gradient = &points.deformation_gradient[p];
         let initial = &points.half_length_initial[p];
-        let new = match (basis, rule) {
-            (Basis::Mpm, _) => [0.5 * root::<D>(points.volume(p)); D],
-            (_, DomainUpdate::None) => continue,
-            (_, DomainUpdate::Det) => {
+        let new = match rule {
+            DomainUpdate::None => continue,
+            DomainUpdate::Det => {
                 let factor = root::<D>(section_determinant::<D>(gradient));
                 initial.map(|l| l * factor)
             }
-            (_, DomainUpdate::Normal) => scaled_by_diagonal(initial, gradient),
-            (_, DomainUpdate::Stretch) => {
+            DomainUpdate::Normal => scaled_by_diagonal(initial, gradient),
+            DomainUpdate::Stretch => {
                 let stretch = square_root(&(gradient.transpose() * gradient));
                 scaled_by_diagonal(initial, &stretch)
             }
-            (_, DomainUpdate::NormalCorrected) => {
+            DomainUpdate::NormalCorrected => {
                 let lengths = scaled_by_diagonal(initial, gradient);
                 with_product(lengths, section_determinant::<D>(gradient) * product(initial))
             }
-            (_, DomainUpdate::NormalIncremental) => {
+            DomainUpdate::NormalIncremental => {
+                let increment = dense::embed(&dense::plus_unit(&step.increments[p]), 1.0);
                 let before = &points.half_length[p];
-                let lengths = scaled_by_diagonal(before, &increments[p]);
-                with_product(lengths, increments[p].determinant() * product(before))
+                let lengths = scaled_by_diagonal(before, &increment);
+                with_product(lengths, increment.determinant() * product(before))
             }
-            (_, DomainUpdate::Corners) => {
-                let lengths = extent_of_moved_sides(grid, points, p, displacement)?;
+            DomainUpdate::Corners => {
+                let lengths = extent_of_moved_sides(step.grids[0], points, p, step.nodal)?;
                 let volume = section_determinant::<D>(gradient) * product(initial);
                 let lengths = with_product(lengths, volume);
                 let of_stretch = extent_of_stretched_sides(initial, gradient);
@@ -98,20 +100,21 @@ pub fn update_domains<const D: usize>(
                 }
             }
         };
-        if !new.iter().all(|l| *l > 0.0 && l.is_finite()) {
-            let rule = if basis == Basis::Mpm { DomainUpdate::None } else { rule };
-            return Err(collapsed(points, p, rule, new));
-        }
+        require_sound(points, p, rule, new)?;
         points.half_length[p] = new;
     }
     Ok(overgrown)
 }
 
-/// Half lengths of the sections of `mpm`'s rings: A^(1/2)/2, A = V0 det F / (2π X F_zz) at the end of a
-/// step.
-pub fn update_sections<const D: usize>(points: &mut Points<D>) {
-    for p in 0..points.len() {
-        points.half_length[p] = [0.5 * points.section(p).sqrt(); D];
+fn require_sound<const D: usize>(
+    points: &Points<D>,
+    p: usize,
+    rule: DomainUpdate,
+    lengths: [f64; D],
+) -> Result<()> {
+    match lengths.iter().all(|l| *l > 0.0 && l.is_finite()) {
+        true => Ok(()),
+        false => Err(collapsed(points, p, rule, lengths)),
     }
 }
 

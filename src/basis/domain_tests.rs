@@ -4,9 +4,9 @@
 
 use nalgebra::Matrix3;
 
-use super::update_domains;
+use crate::basis::contract::{self, DomainStep};
 use crate::basis::map_points;
-use crate::deck::model::{Basis, DomainUpdate};
+use crate::deck::model::{Basis, DomainUpdate, GimpEdge};
 use crate::error::Result;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
@@ -32,6 +32,24 @@ fn points<const D: usize>(at: [f64; D]) -> Points<D> {
     let mut points = Points::default();
     points.push_unstrained(7, 0, at, half.iter().map(|l| 2.0 * l).product(), 1.0, half);
     points
+}
+
+fn update_domains<const D: usize>(
+    grid: &Grid<D>,
+    basis: Basis,
+    rule: DomainUpdate,
+    points: &mut Points<D>,
+    increments: &[Matrix3<f64>],
+    nodal: &dyn Fn(usize) -> [f64; D],
+) -> Result<usize> {
+    let less_unit = |f: &Matrix3<f64>| -> [[f64; D]; D] {
+        let f = f - Matrix3::identity();
+        std::array::from_fn(|i| std::array::from_fn(|j| f[(i, j)]))
+    };
+    let increments: Vec<_> = increments.iter().map(less_unit).collect();
+    let (grids, moved, rings) = ([grid; 2], &[][..], false);
+    let step = DomainStep { grids, increments: &increments, moved, nodal, rings };
+    contract::of_deck(basis, GimpEdge::Continued).update_domains(rule, &step, points)
 }
 
 /// One step from the unstrained state with the linear field u = (F - 1) X on the grid.

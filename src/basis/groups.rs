@@ -13,9 +13,11 @@ pub struct Groups {
     pub group_of_point: Vec<usize>,
     /// Nodes of group g are `nodes[node_offsets[g]..node_offsets[g + 1]]`, ascending.
     pub node_offsets: Vec<usize>,
+    /// Nodes of each group, ascending, one group after the other.
     pub nodes: Vec<usize>,
     /// Points of group g are `points[point_offsets[g]..point_offsets[g + 1]]`.
     pub point_offsets: Vec<usize>,
+    /// Points of each group, one group after the other.
     pub points: Vec<usize>,
 }
 
@@ -66,6 +68,7 @@ impl Groups {
         self.node_offsets.len().saturating_sub(1)
     }
 
+    /// Whether there is no group.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

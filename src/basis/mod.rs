@@ -26,7 +26,6 @@ pub(crate) mod radial;
 #[cfg(test)]
 mod tests;
 
-pub use domain::update_domains;
 pub use groups::Groups;
 
 pub(crate) mod corner;
@@ -51,6 +50,7 @@ pub struct Influences<const D: usize> {
     pub offsets: Vec<usize>,
     /// Global node numbers.
     pub nodes: Vec<usize>,
+    /// S of each entry.
     pub weights: Vec<f64>,
     /// 1/m
     pub gradients: Vec<[f64; D]>,
@@ -116,6 +116,7 @@ impl<const D: usize> Influences<D> {
         self.offsets.len().saturating_sub(1)
     }
 
+    /// Whether there is no row.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -15,6 +15,7 @@ pub struct Row<const D: usize> {
 }
 
 impl<const D: usize> Row<D> {
+    /// Makes the row empty.
     pub fn clear(&mut self) {
         self.entries.clear();
         self.cells.clear();

@@ -2,7 +2,9 @@
 
 /// A number as it is stored; it counts as double precision.
 pub trait Stored: Copy + Default + Into<f64> + Send + Sync + 'static {
+    /// Whether values are kept in double precision.
     const DOUBLE: bool;
+    /// The value as it is kept.
     fn rounded(value: f64) -> Self;
 }
 

@@ -10,7 +10,9 @@ use super::shape::{Form, Shape, padded};
 /// How a box lies to a shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
+    /// All of it is inside.
     Inside,
+    /// All of it is outside.
     Outside,
     /// The boundary may cut it.
     Cut,

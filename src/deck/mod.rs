@@ -29,6 +29,10 @@ pub(crate) mod fields;
 pub mod json_schema;
 pub(crate) mod list;
 mod marks;
+#[allow(
+    missing_docs,
+    reason = "fields and variants are keys and words of the deck: docs/guide/deck.md"
+)]
 pub mod model;
 pub(crate) mod physics;
 mod places;
@@ -66,6 +70,14 @@ use tree::Origin;
 /// Reads and checks a deck. `path` names it in messages, and relative paths inside it start at
 /// its folder; `sets` are the `KEY=VALUE` of `--set`, applied in order before the checks.
 /// Error: up to ten problems, each with its place and what would be right.
+///
+/// ```
+/// use std::path::Path;
+///
+/// let deck = mpm_par::deck::read(Path::new("deck.toml"), "[analysis]\ntype = \"quasistatic\"", &[]);
+/// let problems = deck.expect_err("no such type").to_string();
+/// assert!(problems.contains("deck.toml:2") && problems.contains("quasi-static"));
+/// ```
 pub fn read(path: &Path, text: &str, sets: &[String]) -> Result<Deck> {
     let file = path.display().to_string();
     let sources = Sources { file, text: text.into(), sets: sets.to_vec() };

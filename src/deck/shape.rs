@@ -21,7 +21,9 @@ use super::solid::Solid;
 /// `x` slices have the problem's dimension (2 or 3).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Shape {
+    /// The region in its own frame.
     pub form: Form,
+    /// Where that frame lies.
     pub placement: Placement,
 }
 

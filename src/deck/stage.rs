@@ -20,8 +20,11 @@ pub struct Stage {
 /// Without time the stages before count as one second each.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct When {
+    /// From zero.
     pub stage: usize,
+    /// s of the stage.
     pub factor: f64,
+    /// Over all stages, s.
     pub time: f64,
 }
 
@@ -47,6 +50,7 @@ impl Presence {
     /// There before the first stage.
     pub const BEFORE: Presence = Presence { from: None, until: None, fades: true };
 
+    /// Whether it is there in a stage.
     pub fn is_in(&self, stage: usize) -> bool {
         self.from.is_none_or(|from| from <= stage) && self.until.is_none_or(|until| stage <= until)
     }

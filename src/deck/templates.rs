@@ -6,7 +6,9 @@ use crate::error::{Error, Result};
 /// A commented deck.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Template {
+    /// As `--new` takes it.
     pub name: &'static str,
+    /// The deck.
     pub text: &'static str,
 }
 

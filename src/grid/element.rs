@@ -21,6 +21,7 @@ const HEX_FACES: [&[usize]; 6] =
     [&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]];
 
 impl Element {
+    /// Space dimension.
     pub fn dimension(self) -> usize {
         match self {
             Element::Tri3 | Element::Quad4 => 2,
@@ -28,6 +29,7 @@ impl Element {
         }
     }
 
+    /// Nodes of the element.
     pub fn node_count(self) -> usize {
         match self {
             Element::Tri3 => 3,
@@ -36,6 +38,7 @@ impl Element {
         }
     }
 
+    /// Whether it is a triangle or a tetrahedron.
     pub fn is_simplex(self) -> bool {
         matches!(self, Element::Tri3 | Element::Tet4)
     }
@@ -69,6 +72,7 @@ impl Element {
         }
     }
 
+    /// Its middle in reference coordinates.
     pub fn reference_centre<const D: usize>(self) -> [f64; D] {
         [if self.is_simplex() { 1.0 / (D as f64 + 1.0) } else { 0.0 }; D]
     }

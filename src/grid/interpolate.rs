@@ -9,6 +9,7 @@ use super::{Grid, Lattice, Mesh};
 /// The basis's values at one place: a cell and its nodes in cell order.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ShapeFunctions {
+    /// The cell whose functions these are.
     pub cell: usize,
     /// How many entries of the arrays count.
     pub count: usize,
@@ -21,6 +22,7 @@ pub struct ShapeFunctions {
 /// The basis at one place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Interpolation<const D: usize> {
+    /// N_a(x) and their nodes.
     pub values: ShapeFunctions,
     /// dN_a/dx, 1/m
     pub gradients: [[f64; D]; 8],

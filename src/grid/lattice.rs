@@ -1,6 +1,17 @@
 //! Equal axis-aligned cells; nothing is stored per cell. Indices run x fastest.
 
 /// A regular grid of boxes.
+///
+/// ```
+/// use mpm_par::grid::{Grid, Lattice};
+///
+/// let grid = Grid::Lattice(Lattice { origin: [0.0; 2], spacing: [0.5; 2], cells: [4, 2] });
+/// assert_eq!((grid.node_count(), grid.cell_count()), (15, 8));
+/// // In the middle of a cell its four functions are equal.
+/// let at = grid.interpolate(&[0.75, 0.25], 0.0, None).expect("inside the grid");
+/// assert_eq!(at.values.weights[..4], [0.25; 4]);
+/// assert!(grid.interpolate(&[2.1, 0.25], 0.0, None).is_none());
+/// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lattice<const D: usize> {
     /// Lower corner, m.
@@ -37,26 +48,32 @@ impl<const D: usize> Lattice<D> {
         self.cells.map(|n| n + 1)
     }
 
+    /// Nodes in all.
     pub fn node_count(&self) -> usize {
         self.nodes().iter().product()
     }
 
+    /// Cells in all.
     pub fn cell_count(&self) -> usize {
         self.cells.iter().product()
     }
 
+    /// Number of the node with this index along each axis.
     pub fn node_at(&self, index: [usize; D]) -> usize {
         flatten(index, self.nodes())
     }
 
+    /// Index along each axis of a node.
     pub fn node_index(&self, node: usize) -> [usize; D] {
         unflatten(node, self.nodes())
     }
 
+    /// Number of the cell with this index along each axis.
     pub fn cell_at(&self, index: [usize; D]) -> usize {
         flatten(index, self.cells)
     }
 
+    /// Index along each axis of a cell.
     pub fn cell_index(&self, cell: usize) -> [usize; D] {
         unflatten(cell, self.cells)
     }

@@ -29,6 +29,7 @@ use crate::deck::model::Element;
 pub struct Mesh<const D: usize> {
     /// Where it came from, for messages: a file name or "generated annulus".
     pub name: String,
+    /// The element of all cells.
     pub element: Element,
     pub(crate) positions: Vec<[f64; D]>,
     pub(crate) initial: Vec<[f64; D]>,
@@ -46,10 +47,12 @@ pub struct Mesh<const D: usize> {
 }
 
 impl<const D: usize> Mesh<D> {
+    /// Nodes in all.
     pub fn node_count(&self) -> usize {
         self.positions.len()
     }
 
+    /// Cells in all.
     pub fn cell_count(&self) -> usize {
         self.cells.len() / self.element.node_count()
     }
@@ -70,6 +73,7 @@ impl<const D: usize> Mesh<D> {
         &self.cells[cell * n..(cell + 1) * n]
     }
 
+    /// Appends the nodes of a cell, in the element's order.
     pub fn cell_nodes(&self, cell: usize, out: &mut Vec<usize>) {
         out.extend(self.nodes_of(cell).iter().map(|&n| n as usize));
     }

@@ -45,18 +45,23 @@ use crate::error::{Error, Result};
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug, Clone)]
 pub enum Grid<const D: usize> {
+    /// Equal boxes.
     Lattice(Lattice<D>),
+    /// Elements of a file or of a generator.
     Mesh(Mesh<D>),
 }
 
 /// An interior face: the two cells that share it, in ascending order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FacePair {
+    /// The cell with the lower number.
     pub lower: usize,
+    /// The cell with the higher number.
     pub upper: usize,
 }
 
 impl<const D: usize> Grid<D> {
+    /// Nodes in all.
     pub fn node_count(&self) -> usize {
         match self {
             Grid::Lattice(lattice) => lattice.node_count(),
@@ -64,6 +69,7 @@ impl<const D: usize> Grid<D> {
         }
     }
 
+    /// Cells in all.
     pub fn cell_count(&self) -> usize {
         match self {
             Grid::Lattice(lattice) => lattice.cell_count(),

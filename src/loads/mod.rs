@@ -113,9 +113,19 @@ pub trait Load<const D: usize> {
 #[derive(Clone, Copy)]
 pub enum OnSurface<'a, const D: usize> {
     /// Pa per initial area, one expression of X, Y, Z, s, t per axis.
-    Traction { surface: &'a Surface<D>, value: &'a [Expression] },
+    Traction {
+        /// Where.
+        surface: &'a Surface<D>,
+        /// Force per area.
+        value: &'a [Expression],
+    },
     /// Against the current normal.
-    Pressure { surface: &'a Surface<D>, pressure: &'a Pressure },
+    Pressure {
+        /// Where.
+        surface: &'a Surface<D>,
+        /// p, Pa.
+        pressure: &'a Pressure,
+    },
 }
 
 /// What the start of a run tells of a load.

@@ -11,7 +11,9 @@ use crate::surface::Surface;
 
 /// A pressure and the surface that it acts on.
 pub struct SurfacePressure<const D: usize> {
+    /// Where it acts.
     pub surface: Surface<D>,
+    /// p, Pa.
     pub pressure: Pressure,
 }
 

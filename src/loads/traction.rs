@@ -10,6 +10,7 @@ use crate::surface::Surface;
 
 /// A traction and the surface that it acts on.
 pub struct Traction<const D: usize> {
+    /// Where it acts.
     pub surface: Surface<D>,
     /// Pa, one expression of X, Y, Z, s, t per axis.
     pub value: Vec<Expression>,

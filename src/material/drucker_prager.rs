@@ -22,6 +22,7 @@ const FIT: Parameter = Parameter::choice(
 /// Drucker-Prager plasticity with apex on Hencky elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DruckerPrager {
+    /// Below yield.
     pub elasticity: Hencky,
     eta: f64,
     /// xi c, Pa

@@ -5,6 +5,15 @@ use super::parameter::{POISSON, Parameter, YOUNG};
 use super::{MOST_STATE, Model, Response};
 
 /// Hencky elasticity.
+///
+/// ```
+/// use mpm_par::material::{Hencky, Model};
+///
+/// // A bar that is pulled and may contract: sigma = E eps.
+/// let steel = Hencky::new(210e9, 0.3);
+/// let found = steel.respond([1e-3, -0.3e-3, -0.3e-3], &[]);
+/// assert!((found.stress[0] - 210e6).abs() < 1.0 && found.stress[1].abs() < 1.0);
+/// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hencky {
     /// First Lamé parameter, Pa.

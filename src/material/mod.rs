@@ -168,7 +168,9 @@ models! { Hencky, NeoHookean, VonMises, Tresca, MohrCoulomb, DruckerPrager, CamC
 pub struct Entry {
     /// Deck value of `model`.
     pub name: &'static str,
+    /// One sentence for lists and the reference.
     pub doc: &'static str,
+    /// Keys that it reads.
     pub parameters: &'static [Parameter],
     /// See [`Model::ALTERNATIVES`].
     pub alternatives: &'static [(&'static [&'static str], &'static str)],

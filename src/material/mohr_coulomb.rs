@@ -45,6 +45,7 @@ const TENSION: Parameter = Parameter {
 /// Mohr-Coulomb plasticity with tension cut-off on Hencky elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MohrCoulomb {
+    /// Below yield.
     pub elasticity: Hencky,
     /// sin phi
     sine: f64,

@@ -3,9 +3,13 @@
 /// Interval of numbers; the flags say whether an end belongs to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
+    /// Lower end.
     pub low: f64,
+    /// Whether the lower end belongs to it.
     pub low_included: bool,
+    /// Upper end.
     pub high: f64,
+    /// Whether the upper end belongs to it.
     pub high_included: bool,
 }
 
@@ -65,10 +69,13 @@ pub struct Parameter {
     pub key: &'static str,
     /// SI unit, or empty.
     pub unit: &'static str,
+    /// Where a number must lie.
     pub range: Range,
+    /// What holds where the deck leaves it out.
     pub absence: Absence,
     /// A choice: the parameter's value is the place of the word. Empty for numbers.
     pub words: &'static [&'static str],
+    /// Its meaning, for the reference.
     pub doc: &'static str,
 }
 

@@ -77,6 +77,7 @@ const MOST_ITERATIONS: usize = 50;
 /// Von Mises plasticity on Hencky elasticity.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VonMises {
+    /// Below yield.
     pub elasticity: Hencky,
     /// rho_y, Pa: radius of the cylinder in the deviatoric plane at first yield.
     pub radius: f64,

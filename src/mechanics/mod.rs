@@ -53,10 +53,13 @@ pub struct Contribution<const D: usize> {
 /// What the constitutive update leaves at the point.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct StressState {
+    /// tau, Pa.
     pub kirchhoff_stress: Matrix3<f64>,
     /// b_e - 1
     pub elastic_excess: Matrix3<f64>,
+    /// Norm of the step's plastic logarithmic strain.
     pub plastic_increment: f64,
+    /// Of the step, J per m3 of initial volume.
     pub dissipation: f64,
     /// Stored energy per unit of initial volume, J/m3.
     pub stored_energy: f64,
@@ -83,6 +86,7 @@ impl<'a, const D: usize> From<&'a Square<D>> for Increment<'a, D> {
 /// Inputs at a point that stay fixed during a step.
 #[derive(Debug, Clone, Copy)]
 pub struct StepStart<'a> {
+    /// Of the point's body, with its parameters at the point.
     pub material: LocalMaterial<'a>,
     /// The material's state variables at the start of the step
     pub state: &'a [f64],

@@ -1,6 +1,8 @@
 //! The point that is nearest to a place, over all ranks.
 
 use super::World;
+use crate::deck::rough;
+use crate::grid::Grid;
 use crate::points::Points;
 
 /// Id and distance (m) of the point, of all or of one body, whose initial position is nearest to
@@ -24,4 +26,33 @@ pub fn nearest_point<const D: usize>(
     let near = own.iter().filter(|&&p| distance(p) <= best + slack);
     let id = world.min_u64(near.map(|&p| points.id[p]).min().unwrap_or(u64::MAX));
     (id != u64::MAX).then_some((id, best))
+}
+
+/// Id of the nearest point, at most the diagonal of a cell and half that of the point's domain away.
+/// `body`: index and name of the one that it must belong to. Error, the same on all ranks: there is
+/// none, in words. Collective.
+pub fn require_near<const D: usize>(
+    world: &World,
+    grid: &Grid<D>,
+    points: &Points<D>,
+    body: Option<(usize, &str)>,
+    place: &[f64],
+) -> Result<u64, String> {
+    let nearest = nearest_point(world, points, body.map(|(index, _)| index), place);
+    let Some((id, distance)) = nearest else { return Err("there are no points".to_string()) };
+    let of_body = body.map_or(String::new(), |(_, name)| format!(" of body \"{name}\""));
+    let far = points.id.iter().position(|own| *own == id).and_then(|p| {
+        let half = points.half_length_initial[p].iter().copied().fold(0.0, f64::max);
+        let reach = (D as f64).sqrt() * (grid.cell_size() + half);
+        (distance > reach).then(|| {
+            format!(
+                "{place:?} m is {} m away from the nearest point{of_body}, which is at {:?} m; \
+                 expected a place within a cell of it ({} m)",
+                rough(distance),
+                points.position_initial[p],
+                rough(reach)
+            )
+        })
+    });
+    world.first_message(far).map_or(Ok(id), Err)
 }

@@ -164,6 +164,7 @@ impl<const D: usize> Partition<D> {
         }
     }
 
+    /// Rank that owns a cell.
     pub fn owner_of_cell(&self, grid: &Grid<D>, cell: usize) -> usize {
         self.owner[self.unit_of_cell(grid, cell)] as usize
     }
@@ -182,6 +183,7 @@ impl<const D: usize> Partition<D> {
         self.owner[unit] as usize
     }
 
+    /// Number of the brick, or of the cell on a mesh, that a cell belongs to.
     pub fn unit_of_cell(&self, grid: &Grid<D>, cell: usize) -> usize {
         match (&self.units, grid) {
             (Units::Bricks(bricks), Grid::Lattice(lattice)) => {

@@ -17,22 +17,27 @@ pub struct World {
 }
 
 impl World {
+    /// The ranks of a communicator.
     pub fn new(comm: SimpleCommunicator) -> Self {
         World { comm, exchanges: Cell::new(0) }
     }
 
+    /// For MPI's own calls.
     pub fn comm(&self) -> &SimpleCommunicator {
         &self.comm
     }
 
+    /// This rank's number.
     pub fn rank(&self) -> usize {
         self.comm.rank() as usize
     }
 
+    /// Number of ranks.
     pub fn size(&self) -> usize {
         self.comm.size() as usize
     }
 
+    /// Whether this is rank 0.
     pub fn is_root(&self) -> bool {
         self.comm.rank() == 0
     }
@@ -50,6 +55,7 @@ impl World {
         result
     }
 
+    /// Sum over all ranks. Collective.
     pub fn sum(&self, value: f64) -> f64 {
         self.reduce(value, SystemOperation::sum())
     }
@@ -59,16 +65,19 @@ impl World {
         if self.any(value.is_nan()) { f64::NAN } else { self.reduce(value, SystemOperation::max()) }
     }
 
+    /// Least value of all ranks. Collective.
     pub fn min(&self, value: f64) -> f64 {
         if self.any(value.is_nan()) { f64::NAN } else { self.reduce(value, SystemOperation::min()) }
     }
 
+    /// Least value of all ranks. Collective.
     pub fn min_u64(&self, value: u64) -> u64 {
         let mut result = 0u64;
         reducing(|| self.comm.all_reduce_into(&value, &mut result, SystemOperation::min()));
         result
     }
 
+    /// Sum over all ranks. Collective.
     pub fn sum_usize(&self, value: usize) -> usize {
         let mut result = 0u64;
         reducing(|| {
@@ -116,6 +125,7 @@ impl World {
         result != 0
     }
 
+    /// Returns when all ranks have come here. Collective.
     pub fn barrier(&self) {
         reducing(|| self.comm.barrier());
     }

@@ -19,10 +19,13 @@ const REMAINDER: f64 = 1e-2;
 pub struct Forcing {
     /// eta_0.
     pub first: f64,
+    /// Most that a tolerance may be.
     pub largest: f64,
     /// Smallest: what a solve with fixed tolerance would take.
     pub smallest: f64,
+    /// Factor of the rule.
     pub gamma: f64,
+    /// Exponent of the rule.
     pub alpha: f64,
     /// gamma eta^alpha of the last solve counts only above this.
     pub threshold: f64,

@@ -23,7 +23,9 @@ pub struct Ksp {
 /// How a linear solve ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KspOutcome {
+    /// Of the method.
     pub iterations: usize,
+    /// Whether the tolerance was reached.
     pub converged: bool,
     /// PETSc's word for the end, for example `CONVERGED_RTOL`.
     pub reason: String,

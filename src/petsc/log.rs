@@ -7,15 +7,22 @@ use crate::error::Result;
 /// The rows of the time table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
+    /// Points to cells, basis functions, numbering.
     Locate,
+    /// Forces and tangents.
     Assemble,
+    /// Linear solves.
     Solve,
+    /// Points at the end of a step.
     Update,
+    /// Points to other ranks.
     Migrate,
+    /// Files.
     Output,
 }
 
 impl Phase {
+    /// In the order of the report.
     pub const ALL: [Phase; 6] = [
         Phase::Locate,
         Phase::Assemble,
@@ -25,6 +32,7 @@ impl Phase {
         Phase::Output,
     ];
 
+    /// As the report and `-log_view` have it.
     pub fn name(self) -> &'static str {
         match self {
             Phase::Locate => "locate",

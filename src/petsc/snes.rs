@@ -23,7 +23,9 @@ use crate::error::{Error, Result};
 /// The problem's judgement of an iterate.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
+    /// Another iteration.
     Continue,
+    /// Enough.
     Converged,
     /// Give up; the text says why.
     Diverged(String),
@@ -80,10 +82,13 @@ pub trait NewtonProblem {
 pub struct NewtonOutcome {
     /// Linear solves.
     pub iterations: usize,
+    /// Iterations of all linear solves.
     pub linear_iterations_total: usize,
+    /// Most iterations of one linear solve.
     pub linear_iterations_max: usize,
     /// Relative tolerance of each linear solve.
     pub linear_tolerances: Vec<f64>,
+    /// Whether the problem's test was met.
     pub converged: bool,
     /// It ended because a linear solve failed.
     pub linear_failure: bool,

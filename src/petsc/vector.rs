@@ -100,6 +100,7 @@ impl Vector {
         Ok(norm)
     }
 
+    /// Scalar product. Collective.
     pub fn dot(&self, other: &Vector) -> Result<f64> {
         let mut dot = 0.0;
         petsc!(VecDot(self.raw, other.raw, &mut dot))?;

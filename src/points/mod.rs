@@ -182,7 +182,8 @@ macro_rules! point_fields {
         /// The arrays of [`Points`] that a step has overwritten so far.
         #[derive(Default)]
         pub struct Snapshot<const D: usize> {
-            $( pub $name: Former<$type>, )*
+            $( /// The field as it was.
+            pub $name: Former<$type>, )*
             /// State variables, row by row.
             pub state: Former<f64>,
             /// Elastic slip, row by row.
@@ -326,10 +327,12 @@ impl<const D: usize> Points<D> {
         matches!(field, "velocity_gradient" | "spread")
     }
 
+    /// Number of points on this rank.
     pub fn len(&self) -> usize {
         self.id.len()
     }
 
+    /// Whether this rank has no points.
     pub fn is_empty(&self) -> bool {
         self.id.is_empty()
     }
@@ -413,7 +416,9 @@ pub fn rectangle_corners<const D: usize>(x: [f64; D], half: [f64; D]) -> [[f64; 
 
 /// A field's value as `f64` words.
 pub trait Packed: Sized {
+    /// Appends the value.
     fn write_words(&self, out: &mut Vec<f64>);
+    /// Takes a value off the front.
     fn read_words(words: &mut &[f64]) -> Self;
 }
 

@@ -98,6 +98,7 @@ impl<'a, const D: usize> CellByCell<'a, D> {
         Ok(CellByCell { symmetry: deck.analysis.symmetry, bodies, first_ids })
     }
 
+    /// Bodies of the deck.
     pub fn bodies(&self) -> usize {
         self.bodies.len()
     }

@@ -5,7 +5,9 @@ use std::ops::Range;
 /// Which share of the candidates to make.
 #[derive(Debug, Clone, Copy)]
 pub struct Share {
+    /// From zero.
     pub rank: usize,
+    /// Number of shares.
     pub ranks: usize,
 }
 

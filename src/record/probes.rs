@@ -3,9 +3,9 @@
 //! A point is found once, by its initial position, and followed by its id over ranks and restarts.
 //! The mean over a body is weighted by the initial volume.
 
+use crate::deck::Deck;
 use crate::deck::fields;
 use crate::deck::model::{Probe, Spot};
-use crate::deck::{Deck, rough};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::directory::{PROBES, ResultsDirectory};
@@ -15,7 +15,7 @@ use crate::output::tables::csv_table::{CsvTable, Mark};
 use crate::output::tables::history::HistoryRow;
 use crate::output::terminal::log::Log;
 use crate::parallel::World;
-use crate::parallel::nearest::nearest_point;
+use crate::parallel::nearest::require_near;
 use crate::points::Points;
 
 /// What a probe follows.
@@ -50,22 +50,11 @@ pub fn find<const D: usize>(
                 Followed::Point(*id)
             }
             Spot::Near { place, body } => {
-                let Some((id, distance)) = nearest_point(world, points, *body, place) else {
-                    return refuse(index, "near", "there are no points");
-                };
-                let half =
-                    points.half_length_initial.iter().flatten().fold(0.0, |a: f64, b| a.max(*b));
-                let reach = (D as f64).sqrt() * (grid.cell_size() + world.max(half));
-                if distance > reach {
-                    let why = format!(
-                        "{place:?} m is {} m away from the nearest point, expected a place within \
-                         a cell of one ({} m)",
-                        rough(distance),
-                        rough(reach)
-                    );
-                    return refuse(index, "near", &why);
+                let of = body.map(|body| (body, deck.bodies[body].name.as_str()));
+                match require_near(world, grid, points, of, place) {
+                    Ok(id) => Followed::Point(id),
+                    Err(why) => return refuse(index, "near", &why),
                 }
-                Followed::Point(id)
             }
         });
     }

@@ -6,14 +6,14 @@ use std::sync::Arc;
 use crate::contact::Contacts;
 use crate::deck::expression::Expression;
 use crate::deck::model::{self, Initial, Load};
-use crate::deck::{Deck, Presence, rough};
+use crate::deck::{Deck, Presence};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
 use crate::loads::{self, Found, Manufactured};
 use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
-use crate::parallel::nearest::nearest_point;
+use crate::parallel::nearest::require_near;
 use crate::parallel::{self, Partition, World};
 use crate::points::overlap;
 use crate::points::seed::{self, CellByCell};
@@ -301,27 +301,11 @@ fn find_carriers<const D: usize>(
         }
         let Load::Point { body, nearest, .. } = load else { continue };
         for place in nearest {
-            let nearest_of_all = nearest_point(world, points, Some(*body), place);
-            let (id, best) = nearest_of_all.unwrap_or((u64::MAX, f64::INFINITY));
-            let found = (0..points.len()).find(|&p| points.id[p] == id);
-            let far = found.and_then(|p| {
-                let half = points.half_length_initial[p].iter().copied().fold(0.0, f64::max);
-                let reach = (D as f64).sqrt() * (grid.cell_size() + half);
-                (best > reach).then(|| {
-                    format!(
-                        "{place:?} m is {} m away from the nearest point of body \"{}\", which is \
-                         at {:?} m; expected a place within a cell of it ({} m)",
-                        rough(best),
-                        deck.bodies[*body].name,
-                        points.position_initial[p],
-                        rough(reach)
-                    )
-                })
-            });
-            if let Some(message) = world.first_message(far) {
+            let of = Some((*body, deck.bodies[*body].name.as_str()));
+            let id = require_near(world, grid, points, of, place).map_err(|why| {
                 let key = format!("load.{index}.point.nearest");
-                return Err(Error::Input(deck.places.say(&key, &message)));
-            }
+                Error::Input(deck.places.say(&key, &why))
+            })?;
             all[index].carriers.push((id, 1.0 / nearest.len() as f64));
         }
     }

@@ -19,17 +19,21 @@ pub struct StepSpan {
     pub stage: usize,
     /// s of the stage.
     pub factor_start: f64,
+    /// s at the end.
     pub factor_end: f64,
     /// s
     pub time_start: f64,
+    /// s
     pub time_end: f64,
 }
 
 impl StepSpan {
+    /// The moment at which it begins.
     pub fn start(&self) -> When {
         When { stage: self.stage, factor: self.factor_start, time: self.time_start }
     }
 
+    /// The moment at which it ends.
     pub fn end(&self) -> When {
         When { stage: self.stage, factor: self.factor_end, time: self.time_end }
     }

@@ -57,6 +57,7 @@ struct BorderRow {
 }
 
 impl<const B: usize> RowAddresses<B> {
+    /// Of the rows of a pattern.
     pub fn new(numbering: &Numbering, pattern: &Pattern) -> Self {
         let rows = pattern.offsets.len().saturating_sub(1);
         let mut addresses = RowAddresses {

@@ -18,8 +18,11 @@ use super::supports::Support;
 
 /// What stays the same while points move: the deck made computable.
 pub struct Model<const D: usize> {
+    /// What the user asked for.
     pub deck: Deck,
+    /// The background grid as it is in this step.
     pub grid: Grid<D>,
+    /// Who owns what.
     pub partition: Partition<D>,
     /// One per body.
     pub materials: Vec<Material>,
@@ -33,9 +36,11 @@ pub struct Model<const D: usize> {
     pub loads: Vec<Box<dyn Load<D>>>,
     /// Surfaces that are held off the grid's nodes.
     pub supports: Vec<Support<D>>,
+    /// Rigid bodies and what touches them.
     pub contacts: Arc<Contacts<D>>,
     /// The field of a `manufactured` load with its derivatives.
     pub manufactured: Option<Manufactured>,
+    /// What is known of the ranks' loads.
     pub balance: Balance,
     /// Points of bodies that come with a later stage.
     pub waiting: Points<D>,

@@ -109,6 +109,7 @@ impl Numbering {
         self.nodes.len()
     }
 
+    /// Whether this rank knows no node.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }

@@ -48,6 +48,7 @@ impl<const B: usize> BlockRows<B> for BlockMatrix<B> {
 }
 
 impl<const B: usize> BlockMatrix<B> {
+    /// A matrix of this pattern, all zero.
     pub fn zeros(pattern: &Pattern) -> Self {
         BlockMatrix { values: vec![0.0; pattern.columns.len() * B * B] }
     }

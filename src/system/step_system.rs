@@ -23,7 +23,9 @@ use crate::points::Points;
 
 /// Everything a step needs that depends on where the points are at its start.
 pub struct Discretisation<const D: usize> {
+    /// Basis functions of the points.
     pub influences: Influences<D>,
+    /// Points that touch the same nodes.
     pub groups: Groups,
     /// Local node of each entry of `groups.nodes`.
     pub group_nodes: Vec<u32>,
@@ -31,10 +33,13 @@ pub struct Discretisation<const D: usize> {
     pub border: Border,
     /// The same of groups.
     pub group_border: Border,
+    /// Cells with material.
     pub populated: Populated,
     /// Faces owned here.
     pub faces: Vec<FaceStencil>,
+    /// Equation numbers of the nodes.
     pub numbering: Numbering,
+    /// Sparsity of the equations.
     pub pattern: Pattern,
     /// How firmly each local node holds material: the weight, and for `mpm` the size of the
     /// gradients too, which is finite where a point on a cell's edge has no weight.

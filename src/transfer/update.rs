@@ -5,10 +5,9 @@ use std::cell::Cell;
 
 use nalgebra::Matrix3;
 
-use crate::basis::domain::{update_domains, update_sections};
-use crate::basis::{cpdi1, cpdi2};
+use crate::basis::contract::{self, DomainStep};
 use crate::deck::figure;
-use crate::deck::model::{Basis, Boundary, DomainUpdate, Place, Symmetry};
+use crate::deck::model::{Basis, Boundary, GimpEdge, Place, Symmetry};
 use crate::deck::schema::{AXES, SIDES};
 use crate::error::Result;
 use crate::grid::Grid;
@@ -56,9 +55,11 @@ pub fn straining<'a, const D: usize>(
 /// Energies of this rank's points, J (J/m in plane strain).
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct PointEnergies {
+    /// Stored elastically.
     pub strain: f64,
     /// Dissipated since the start.
     pub plastic: f64,
+    /// Of the motion.
     pub kinetic: f64,
 }
 
@@ -266,32 +267,30 @@ pub fn not_finite<const D: usize>(points: &Points<D>) -> Option<String> {
     ))
 }
 
-/// Refuses a step that would turn a CPDI domain over or carry it out of `after`, the grid of the next
-/// step; otherwise `increments` learn where the corners of `cpdi2` go. `displacement`: local
-/// nodes, m. Collective.
+/// Refuses a step that would turn a CPDI domain over or carry it out of the second of the `grids`, that
+/// of the next step; otherwise notes in `increments` where the corners of `cpdi2` go. `displacement`:
+/// local nodes, m. Collective.
 pub fn require_sound_domains<const D: usize>(
     world: &World,
-    [grid, after]: [&Grid<D>; 2],
+    grids: [&Grid<D>; 2],
     basis: Basis,
     numbering: &Numbering,
     displacement: &[f64],
     points: &Points<D>,
     increments: &mut Increments<D>,
 ) -> std::result::Result<(), Refusal> {
-    if !matches!(basis, Basis::Cpdi1 | Basis::Cpdi2) {
+    let functions = contract::of_deck::<D>(basis, GimpEdge::Continued);
+    if !functions.domains_deform() {
         return Ok(());
     }
     let nodal = |node| nodal_displacement(numbering, displacement, node);
+    let Increments { deformation, displacement: moved, corners, .. } = increments;
+    let rings = !deformation.hoops.is_empty();
+    let step = DomainStep { grids, increments: &deformation.blocks, moved, nodal: &nodal, rings };
     let mut hint = None;
     let mut check = |p: usize| -> Result<()> {
-        if basis == Basis::Cpdi2 {
-            let grids = [grid, after];
-            increments.corners.push(cpdi2::moved_corners(grids, points, p, &mut hint, &nodal)?);
-            return Ok(());
-        }
-        let increment = dense::plus_unit(&increments.deformation.blocks[p]);
-        let moved = &increments.displacement[p];
-        cpdi1::check_step(after, points, p, &increment, moved, &mut hint)
+        corners.extend(functions.check_domain(&step, points, p, &mut hint)?);
+        Ok(())
     };
     let reason = (0..points.len()).find_map(|p| check(p).err());
     match world.first_message(reason.map(|error| error.to_string())) {
@@ -446,28 +445,30 @@ pub fn follow<const D: usize>(
     points: &mut Points<D>,
     before: Option<&mut Snapshot<D>>,
 ) -> Result<usize> {
-    let (basis, rule) = (model.deck.method.basis, model.deck.method.domain_update);
+    let method = &model.deck.method;
+    let carried = !increments.corners.is_empty();
     if let Some(before) = before {
         before.half_length.copy(&points.half_length);
-        if basis == Basis::Cpdi2 {
+        if carried {
             before.corners.set_aside(&mut points.corners);
         }
     }
-    if basis == Basis::Cpdi2 {
+    if carried {
         points.corners.copy_from_slice(&increments.corners);
     }
-    let whole: Vec<Matrix3<f64>> = match rule {
-        DomainUpdate::NormalIncremental => {
-            increments.deformation.blocks.iter().map(embed).collect()
-        }
-        _ => Vec::new(),
+    let Increments { deformation, displacement: moved, .. } = increments;
+    let step = DomainStep {
+        grids: [&model.grid; 2],
+        increments: &deformation.blocks,
+        moved,
+        nodal: &|node| nodal_displacement(numbering, displacement, node),
+        rings: model.deck.analysis.symmetry == Symmetry::Axisymmetric,
     };
-    if basis == Basis::Mpm && model.deck.analysis.symmetry == Symmetry::Axisymmetric {
-        update_sections(points);
-        return Ok(0);
-    }
-    let nodal = |node| nodal_displacement(numbering, displacement, node);
-    update_domains(&model.grid, basis, rule, points, &whole, &nodal)
+    contract::of_deck(method.basis, method.gimp_edge).update_domains(
+        method.domain_update,
+        &step,
+        points,
+    )
 }
 
 /// Lagrangian eq. 31, Ghost eq. 9, 14.
@@ -480,11 +481,6 @@ pub fn move_points<const D: usize>(
     overwrite(&mut points.position, former, displacement, |x, moved| {
         std::array::from_fn(|i| x[i] + moved[i])
     });
-}
-
-/// dF of dF - 1; that of plane strain has dF_zz = 1.
-fn embed<const D: usize>(increment: &[[f64; D]; D]) -> Matrix3<f64> {
-    dense::embed(&dense::plus_unit(increment), 1.0)
 }
 
 /// Energies of this rank's points at their present state.

@@ -120,10 +120,7 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
     }
 
     fn prepare_solver(&mut self, solver: &Ksp, matrix: &mut Matrix, earlier: usize) -> Result<()> {
-        let mut levels = std::mem::take(&mut self.installed);
-        let outcome = levels.prepare(self, solver, matrix, earlier);
-        self.installed = levels;
-        outcome
+        Levels::prepare(self, solver, matrix, earlier)
     }
 
     fn record_solve(&mut self, iterations: usize, tolerance: f64) {
@@ -132,6 +129,10 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
 }
 
 impl<const D: usize> Levelled for Hardening<'_, D> {
+    fn levels(&mut self) -> &mut Levels {
+        &mut self.installed
+    }
+
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         if !self.levels {
             return Ok(None);

@@ -2,7 +2,7 @@
 
 use crate::amg::level::Assembled;
 use crate::amg::symmetric_part::symmetric_part;
-use crate::amg::{self, Hierarchy, Levelled};
+use crate::amg::{self, Hierarchy, Levelled, Levels};
 use crate::analysis::convergence::{converges_next, hardly_falls};
 use crate::blocks::BlockProduct;
 use crate::error::Result;
@@ -93,10 +93,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 
     fn prepare_solver(&mut self, solver: &Ksp, matrix: &mut Matrix, earlier: usize) -> Result<()> {
-        let mut levels = std::mem::take(&mut self.levels);
-        let outcome = levels.prepare(self, solver, matrix, earlier);
-        self.levels = levels;
-        outcome
+        Levels::prepare(self, solver, matrix, earlier)
     }
 
     fn record_solve(&mut self, iterations: usize, tolerance: f64) {
@@ -105,6 +102,10 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
 }
 
 impl<const D: usize> Levelled for Equilibrium<'_, D> {
+    fn levels(&mut self) -> &mut Levels {
+        &mut self.levels
+    }
+
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         self.with_rows(matrix, |rows| {
             let symmetric = self.symmetric();

@@ -31,10 +31,13 @@ use std::time::Instant;
 /// Limits and choices of the iteration.
 #[derive(Debug, Clone, Copy)]
 pub struct NewtonSettings {
+    /// Largest normalised residual of a converged step (Lagrangian eq. 40).
     pub tolerance: f64,
     /// Evaluations, the one at zero displacement included.
     pub max_evaluations: usize,
+    /// The configuration that stresses and gradients refer to.
     pub frame: Frame,
+    /// What happens to an iterate with det dF <= 0.
     pub inverted: InvertedIterates,
     /// The tangent equals its transposed.
     pub symmetric: bool,
@@ -42,6 +45,7 @@ pub struct NewtonSettings {
 
 /// What a step's equations consist of beside the stress of its points.
 pub struct StepEquations<'a, const D: usize> {
+    /// What boundaries prescribe.
     pub conditions: &'a Conditions,
     /// Local nodes that carry no equation of their own (`drop_below`).
     pub left_out: &'a [bool],
@@ -141,6 +145,7 @@ enum Tangent {
 }
 
 impl<'a, const D: usize> Equilibrium<'a, D> {
+    /// The equations of one step, before any iterate.
     pub fn new(
         world: &'a World,
         grid: &'a Grid<D>,
@@ -216,6 +221,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         self.following.as_ref().map_or(&[], |followed| &followed.force)
     }
 
+    /// Limits and choices of the iteration.
     pub fn settings(&self) -> &NewtonSettings {
         &self.settings
     }

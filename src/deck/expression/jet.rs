@@ -12,6 +12,7 @@ const PAIR: [[usize; 2]; 6] = [[0, 0], [0, 1], [0, 2], [1, 1], [1, 2], [2, 2]];
 /// A number and its derivatives with respect to X, Y and Z.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Jet {
+    /// The value itself.
     pub value: f64,
     /// d/dX, d/dY, d/dZ, 1/m times the unit of the value.
     pub first: [f64; 3],
@@ -23,6 +24,7 @@ pub struct Jet {
 }
 
 impl Jet {
+    /// A number that depends on nothing.
     pub fn constant(value: f64) -> Self {
         Jet { value, ..Jet::default() }
     }
@@ -108,10 +110,12 @@ impl Jet {
         self.apply([x.powf(n), term(n, n - 1.0), term(n * (n - 1.0), n - 2.0)])
     }
 
+    /// e^self
     pub fn exp(self) -> Self {
         self.apply([self.value.exp(); 3])
     }
 
+    /// Natural logarithm.
     pub fn ln(self) -> Self {
         let r = 1.0 / self.value;
         self.apply([self.value.ln(), r, -r * r])

@@ -52,19 +52,29 @@ impl Scope {
     }
 }
 
+/// What a formula may depend on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Variable {
+    /// X
     InitialX,
+    /// Y
     InitialY,
+    /// Z
     InitialZ,
+    /// x
     CurrentX,
+    /// y
     CurrentY,
+    /// z
     CurrentZ,
+    /// s
     LoadFactor,
+    /// t
     Time,
 }
 
 impl Variable {
+    /// All of them, as [`Scope`] lists them.
     pub const ALL: [Variable; 8] = [
         Variable::InitialX,
         Variable::InitialY,
@@ -96,6 +106,17 @@ impl Variable {
 }
 
 /// A parsed formula or a constant. Cloning is cheap; equality is equality of the text.
+///
+/// ```
+/// use mpm_par::deck::{Expression, Scope};
+///
+/// let depth = Expression::parse("9.81e3 * max(0, 8 - y)")?;
+/// let scope = Scope { current: [0.0, 6.0, 0.0], ..Scope::default() };
+/// assert!((depth.value(&scope) - 19_620.0).abs() < 1e-9);
+/// assert_eq!(Expression::parse("2 * 3")?.as_constant(), Some(6.0));
+/// assert!(Expression::parse("2 *").is_err());
+/// # Ok::<(), String>(())
+/// ```
 #[derive(Debug, Clone)]
 pub struct Expression {
     text: String,
@@ -118,12 +139,14 @@ impl Expression {
         Ok(Expression { text: text.to_string(), constant, formula: Arc::new(program) })
     }
 
+    /// A number.
     pub fn constant(value: f64) -> Self {
         let mut program = Program::default();
         program.push(program::Operation::Number(value));
         Expression { text: value.to_string(), constant: Some(value), formula: Arc::new(program) }
     }
 
+    /// As the deck has it.
     pub fn text(&self) -> &str {
         &self.text
     }
@@ -133,6 +156,7 @@ impl Expression {
         self.constant
     }
 
+    /// Whether the variable stands in it.
     pub fn depends_on(&self, variable: Variable) -> bool {
         self.formula.contains(variable)
     }

@@ -25,12 +25,15 @@ pub const AXES: [&str; 3] = ["x", "y", "z"];
 /// What a value may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
+    /// A string.
     Text,
+    /// A number.
     Number,
     /// A whole number.
     Count,
     /// true or false.
     Flag,
+    /// One of these words.
     Choice(&'static [&'static str]),
     /// A list of some of these words.
     Choices(&'static [&'static str]),
@@ -48,6 +51,7 @@ pub enum Kind {
     CountOrCounts,
     /// A list of positions.
     Points,
+    /// A table with the keys of this section.
     Table(&'static str),
     /// A table whose keys the user names.
     Named(&'static str),
@@ -86,6 +90,7 @@ impl Kind {
     }
 }
 
+/// Words in quotation marks, with commas.
 pub fn quoted(words: &[&str]) -> String {
     words.iter().map(|word| format!("\"{word}\"")).collect::<Vec<_>>().join(", ")
 }
@@ -93,6 +98,7 @@ pub fn quoted(words: &[&str]) -> String {
 /// Whether a key may be left out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Need {
+    /// It must be given.
     Required,
     /// The text says when it is needed or what happens without it.
     Optional(&'static str),
@@ -103,21 +109,28 @@ pub enum Need {
 /// One key of the deck.
 #[derive(Debug, Clone, Copy)]
 pub struct Key {
+    /// As the deck spells it.
     pub name: &'static str,
+    /// What its value may be.
     pub kind: Kind,
     /// SI unit, or empty.
     pub unit: &'static str,
+    /// Whether it may be left out.
     pub need: Need,
+    /// Where a number must lie.
     pub range: Range,
     /// Choices that read it: all must have been made. Empty: it is always read.
     pub readers: &'static [Reader],
+    /// Its meaning, for the reference.
     pub doc: &'static str,
 }
 
 /// A choice made elsewhere in the deck, by its dotted path, and its values that read a key.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reader {
+    /// Dotted path of the choice.
     pub choice: &'static str,
+    /// Values of it that read the key.
     pub values: &'static [&'static str],
 }
 
@@ -176,7 +189,9 @@ pub struct Section {
     pub name: &'static str,
     /// How the table is written in a deck.
     pub header: &'static str,
+    /// Its meaning, for the reference.
     pub doc: &'static str,
+    /// In the order of the reference.
     pub keys: &'static [Key],
 }
 

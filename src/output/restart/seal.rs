@@ -34,6 +34,7 @@ pub enum Flaw {
 pub struct Checksum(u64);
 
 impl Checksum {
+    /// The sum of no words; other starts give other sums.
     pub fn new(start: u64) -> Self {
         Checksum(start ^ 0x9e37_79b9_7f4a_7c15)
     }
@@ -54,6 +55,7 @@ impl Checksum {
         self.add(bytes.len() as u64);
     }
 
+    /// The sum.
     pub fn finish(mut self) -> u64 {
         self.add(0);
         self.0
@@ -65,6 +67,7 @@ pub fn checksum_of(text: &str) -> u64 {
     checksum_of_bytes(text.as_bytes())
 }
 
+/// Checksum of bytes.
 pub fn checksum_of_bytes(bytes: &[u8]) -> u64 {
     let mut sum = Checksum::new(0);
     sum.add_bytes(bytes);

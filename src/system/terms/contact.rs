@@ -532,7 +532,9 @@ pub struct Touching {
 /// What a step of contact leaves, this rank's share.
 #[derive(Debug)]
 pub struct Finished<const D: usize> {
+    /// Of each rigid body.
     pub rigids: Vec<Exerted>,
+    /// Of each contact.
     pub pairs: Vec<Touching>,
     /// In penalties, J.
     pub energy: f64,

@@ -24,15 +24,19 @@ use super::term::{At, Health, Part, Term};
 /// What a step's points look like to the equations: fixed while the step is solved.
 #[derive(Clone, Copy)]
 pub struct StepPoints<'a, const D: usize> {
+    /// At the start of the step.
     pub points: &'a Points<D>,
     /// One material per body.
     pub materials: &'a [Material],
+    /// Their basis functions.
     pub influences: &'a Influences<D>,
+    /// Points that touch the same nodes.
     pub groups: &'a Groups,
     /// Local node index of each entry of `groups.nodes`.
     pub group_nodes: &'a [u32],
     /// Groups that touch nodes of other ranks, and the others.
     pub border: &'a Border,
+    /// What stresses are integrated over.
     pub volume: PointVolume,
 }
 
@@ -53,7 +57,9 @@ impl<'a, const D: usize> StepPoints<'a, D> {
 
 /// The stress of the points as a term of the equations.
 pub struct Stress<'a, const D: usize> {
+    /// The points.
     pub step: StepPoints<'a, D>,
+    /// The configuration that stresses and gradients refer to.
     pub frame: Frame,
     /// The tangents of all materials are symmetric.
     pub symmetric: bool,

@@ -72,9 +72,13 @@ const NO_WEIGHT: f64 = 1e-12;
 /// origin, and volume of the points that carry it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Borne {
+    /// N
     pub force: [f64; 3],
+    /// Sum of the magnitudes, N.
     pub sum_abs: f64,
+    /// N m
     pub torque: f64,
+    /// m3
     pub held: f64,
 }
 

@@ -7,6 +7,7 @@ use crate::system::scatter::BlockMatrix;
 /// An iterate.
 #[derive(Clone, Copy)]
 pub struct At<'a> {
+    /// Sparsity of the equations.
     pub pattern: &'a Pattern,
     /// Nodal increments of the local degrees of freedom, m.
     pub displacement: &'a [f64],
@@ -32,6 +33,7 @@ pub struct Health {
 }
 
 impl Health {
+    /// Whether all stresses are finite.
     pub fn is_sound(&self) -> bool {
         self.not_finite.is_none()
     }
