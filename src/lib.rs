@@ -10,8 +10,8 @@
 //! | the algorithms: load steps, time steps, Newton's method (Ghost §2.3, 2.4; Lagrangian §6.3, 6.5) | [`analysis`] |
 //! | what a run tells | [`record`] |
 //! | results on disk and on the terminal | [`output`] |
-//! | points to nodes and back (Ghost eq. 6, 8-10; Lagrangian eq. 31-39) | [`transfer`] |
 //! | mass of the nodes and its solve (Ghost eq. 7, 15, 24) | [`mass`] |
+//! | points to nodes and back (Ghost eq. 6, 8-10; Lagrangian eq. 31-39) | [`transfer`] |
 //! | (d) multigrid's levels | [`amg`] |
 //! | a step's equations and their terms (Lagrangian eq. 27-29) | [`system`] |
 //! | external forces | [`loads`] |
@@ -24,8 +24,8 @@
 //! | (a) basis functions, domain updates (Lagrangian §6.1, 6.4; Rotation §2) | [`basis`] |
 //! | material points | [`points`] |
 //! | background lattice or mesh | [`grid`] |
+//! | (d) products by blocks | [`blocks`] |
 //! | (d) solvers | [`petsc`] |
-//! | (d) their products by blocks | [`blocks`] |
 //! | small tensors | [`tensor`] |
 //! | `input.toml` | [`deck`] |
 //! | files that a user names, opened with care | [`input_file`] |

@@ -1,4 +1,5 @@
-//! What the errors of Newton's iterates so far, one for each evaluation of a step, tell of the next.
+//! Estimates from the errors of a step's iterates: whether the next iterate will be converged, and
+//! whether the errors still fall.
 
 /// Whether the next error is likely below the tolerance: by Newton's method with solves that are
 /// not exact, between a fall by the last factor once more and by its square, or by the square of

@@ -15,7 +15,7 @@ use crate::transfer::refusal::{Cause, Halt};
 
 use super::explicit_contact::ContactSteps;
 use super::explicit_step::advance;
-use super::time_loop::{Analysis, Answer, Manner, Next};
+use super::time_loop::{Analysis, Answer, Labels, Next};
 use super::time_steps::{TimeSteps, ledger_at_start, stability_limit};
 
 /// The explicit analysis between its steps.
@@ -46,8 +46,8 @@ impl<const D: usize> Explicit<D> {
 }
 
 impl<const D: usize> Analysis<D> for Explicit<D> {
-    fn manner(&self) -> Manner {
-        Manner { newton: false, time: true, steps: None }
+    fn labels(&self) -> Labels {
+        Labels { newton: false, time: true, steps: None }
     }
 
     fn restore(&mut self, state: &RunState) -> Result<()> {

@@ -29,7 +29,7 @@ use super::inertial::{Dynamics, InertialStep};
 use super::load_steps::Stepping;
 use super::newton::{self, Carried};
 use super::solver::Trials;
-use super::time_loop::{Analysis, Answer, Manner, Next};
+use super::time_loop::{Analysis, Answer, Labels, Next};
 
 /// Both implicit analyses between their steps.
 pub struct Implicit<const D: usize> {
@@ -59,8 +59,8 @@ impl<const D: usize> Implicit<D> {
 }
 
 impl<const D: usize> Analysis<D> for Implicit<D> {
-    fn manner(&self) -> Manner {
-        Manner { newton: true, time: self.dynamics.is_some(), steps: Some(self.stepping.steps()) }
+    fn labels(&self) -> Labels {
+        Labels { newton: true, time: self.dynamics.is_some(), steps: Some(self.stepping.steps()) }
     }
 
     fn restore(&mut self, state: &RunState) -> Result<()> {

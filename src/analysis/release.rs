@@ -1,9 +1,9 @@
-//! What held the bodies and goes in a stage is released over it.
+//! The force of bodies and boundaries that go with a stage is released over that stage.
 //!
-//! In quasi-static steps: what is left out of balance where a step starts is what has gone, bodies
-//! and boundaries, as all else was in balance. With g = f_int - f_ext at the start, the forces
-//! g (1 - s') / (1 - s) act at the end: they fall from all of it to nothing over the stage, whatever
-//! the steps, and nothing needs to be remembered between steps.
+//! In quasi-static steps the bodies were in balance before. The force g = f_int - f_ext that is out
+//! of balance at the start of a step is therefore the force of all that has gone. At the end of the
+//! step g (1 - s') / (1 - s) acts: over the stage the force falls in full to nothing, whatever the
+//! steps, and nothing has to be remembered between steps.
 //!
 //! In dynamics the points of a body that goes act with the share 1 - s of their stress: s f_int of
 //! these points pushes against it.

@@ -18,7 +18,7 @@ use crate::system::conditions::StepSpan;
 use crate::transfer::refusal::{Cause, Halt, Refusal};
 
 use super::implicit::Implicit;
-use super::time_loop::{Analysis, Answer, Manner, Next};
+use super::time_loop::{Analysis, Answer, Labels, Next};
 
 /// Growth of the factor while there is no upper end.
 const GROWTH: f64 = 1.25;
@@ -159,8 +159,8 @@ impl<const D: usize> StrengthReduction<D> {
 }
 
 impl<const D: usize> Analysis<D> for StrengthReduction<D> {
-    fn manner(&self) -> Manner {
-        Manner { steps: None, ..self.implicit.manner() }
+    fn labels(&self) -> Labels {
+        Labels { steps: None, ..self.implicit.labels() }
     }
 
     fn restore(&mut self, state: &RunState) -> Result<()> {

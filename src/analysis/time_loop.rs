@@ -47,7 +47,7 @@ pub enum Answer {
 
 /// How lines and messages name the steps of an analysis.
 #[derive(Debug, Clone, Copy)]
-pub struct Manner {
+pub struct Labels {
     /// Of Newton's iteration: the terminal tells of it.
     pub newton: bool,
     /// Frames and messages carry the time rather than the load factor.
@@ -58,7 +58,7 @@ pub struct Manner {
 
 /// What an analysis gives the loop.
 pub trait Analysis<const D: usize> {
-    fn manner(&self) -> Manner;
+    fn labels(&self) -> Labels;
 
     /// Takes its state out of a checkpoint.
     fn restore(&mut self, state: &RunState) -> Result<()>;
@@ -160,7 +160,7 @@ fn halted<const D: usize>(
         Halt::Failed(error) if !undone => return Err(error),
         halt => halt,
     };
-    let (Manner { time, steps, .. }, number) = (analysis.manner(), next.number);
+    let (Labels { time, steps, .. }, number) = (analysis.labels(), next.number);
     let mut cuts = false;
     match &halt {
         Halt::Refused(refusal) => {
@@ -211,7 +211,7 @@ fn finish<const D: usize>(
     mut solved: Solved<D>,
     moment: Moment,
 ) -> Result<(bool, Option<Ending>)> {
-    let (number, manner) = (next.number, analysis.manner());
+    let (number, manner) = (next.number, analysis.labels());
     // Without time it is the load factor, counted on over the stages.
     let label = next.span.time_end;
     let framed = moment != Moment::PartOfStep

@@ -318,7 +318,7 @@ impl<const D: usize> Basis<D> for Cpdi1 {
         _: &DomainStep<'_, D>,
         points: &mut Points<D>,
     ) -> Result<usize> {
-        domain::update_extents(points, |points, p| cpdi1::corner_positions(points, p));
+        domain::update_extents(points, cpdi1::corner_positions);
         Ok(0)
     }
 }

@@ -1,4 +1,5 @@
-//! Surfaces against their derivatives by differences, and the law against its own.
+//! Distances, normals and curvatures of surfaces against differences; the tangent of the contact law
+//! against differences of its force.
 
 use super::ball::Ball;
 use super::capsule::Capsule;

@@ -40,7 +40,7 @@ pub(crate) fn ties<const D: usize>(
     let mut found: BTreeMap<(usize, usize), u64> = BTreeMap::new();
     for (patch, bodies) in patches.values() {
         for body in (0..u64::BITS).filter(|body| bodies >> body & 1 == 1) {
-            for pair in patch.loose(cells, 1 << body) {
+            for pair in patch.tie_groups(cells, 1 << body) {
                 if partition.owner_of_cell(grid, pair.lower) == here {
                     *found.entry((pair.lower, pair.upper)).or_default() |= 1 << body;
                 }
@@ -87,7 +87,7 @@ impl Patch {
     }
 
     /// Pairs that tie the groups of one body's cells to the largest of them.
-    fn loose(&self, cells: &KnownCells, body: u64) -> Vec<FacePair> {
+    fn tie_groups(&self, cells: &KnownCells, body: u64) -> Vec<FacePair> {
         let state: Vec<Cell> =
             self.cells.iter().map(|&cell| cells.get(cell).copied().unwrap_or_default()).collect();
         let filled = |at: usize| state[at].populated & body != 0;

@@ -1,10 +1,10 @@
-//! The order in which a rank eliminates its nodes: inner ones first, on a plane lattice along its axes
-//! towards the border with other ranks; the border last, ascending.
+//! The order in which a rank eliminates its nodes: first the inner ones, on a plane lattice along its
+//! axes towards the border with other ranks, then those on the border, ascending.
 //!
 //! The mass of evenly spread points is a Kronecker product over the axes, and the factor of a
-//! product has no fill in any order that runs along each axis one way. With the border last that
-//! holds on both sides of it only where each side runs towards it: away from it, what is
-//! eliminated first couples the border with the far end.
+//! product has no fill in any order that runs along each axis one way. The border comes last, so each
+//! side has to run towards it: nodes eliminated on the way from the border to the far end would couple
+//! the two.
 
 use std::ops::Range;
 

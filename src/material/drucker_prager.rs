@@ -3,6 +3,7 @@
 //! p = xi c / eta (de Souza Neto, Peric, Owen 2008, section 8.3); with `softening` cohesion and angles
 //! fall with the plastic strain ([`super::softening`]).
 
+use super::model::elastic_by;
 use super::mohr_coulomb::{COHESION, DILATION, FRICTION, STIFF, check_cone, check_residual};
 use super::parameter::{POISSON, Parameter};
 use super::softening::{self, Falling};
@@ -235,21 +236,7 @@ impl Model for DruckerPrager {
         }
     }
 
-    fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
-        self.elasticity.strain(stress)
-    }
-
-    fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
-        self.elasticity.energy(elastic_strain)
-    }
-
-    fn wave_modulus(&self, _: impl FnOnce() -> [f64; 3]) -> f64 {
-        self.elasticity.p_wave_modulus()
-    }
-
-    fn stiffness(&self) -> f64 {
-        self.elasticity.young
-    }
+    elastic_by!(elasticity);
 
     fn symmetric(&self) -> bool {
         self.eta == self.eta_bar && self.softening.is_none()

@@ -115,3 +115,26 @@ pub trait Model: Copy + Sized {
     /// Whether the tangent is symmetric in every state.
     fn symmetric(&self) -> bool;
 }
+
+/// What a model answers that is elastic below yield by another one, its `field`.
+macro_rules! elastic_by {
+    ($field:ident) => {
+        fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
+            self.$field.elastic_strain(stress)
+        }
+
+        #[inline(always)]
+        fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
+            self.$field.energy(elastic_strain)
+        }
+
+        fn wave_modulus(&self, elastic_strain: impl FnOnce() -> [f64; 3]) -> f64 {
+            self.$field.wave_modulus(elastic_strain)
+        }
+
+        fn stiffness(&self) -> f64 {
+            self.$field.stiffness()
+        }
+    };
+}
+pub(super) use elastic_by;

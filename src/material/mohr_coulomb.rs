@@ -11,6 +11,7 @@
 //! trial stress the return then changes with the planes, at the rate
 //! tau' = -D G' l - D G l', l' = (N D G)^-1 (N' tau - k' - N D G' l), l the multipliers.
 
+use super::model::elastic_by;
 use super::parameter::{Absence, POISSON, POSITIVE, Parameter, Range, YOUNG, at_least};
 use super::softening::{self, Falling};
 use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
@@ -505,21 +506,7 @@ impl Model for MohrCoulomb {
         }
     }
 
-    fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
-        self.elasticity.strain(stress)
-    }
-
-    fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
-        self.elasticity.energy(elastic_strain)
-    }
-
-    fn wave_modulus(&self, _: impl FnOnce() -> [f64; 3]) -> f64 {
-        self.elasticity.p_wave_modulus()
-    }
-
-    fn stiffness(&self) -> f64 {
-        self.elasticity.young
-    }
+    elastic_by!(elasticity);
 
     fn symmetric(&self) -> bool {
         self.sine == self.dilation && self.softening.is_none()

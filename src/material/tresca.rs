@@ -1,6 +1,7 @@
 //! f = tau_1 - tau_3 - 2 c_u = 0 in Kirchhoff stress: Mohr-Coulomb without friction and dilation,
 //! perfect or softening.
 
+use super::model::elastic_by;
 use super::mohr_coulomb::{STIFF, check_residual};
 use super::parameter::{POISSON, POSITIVE, Parameter};
 use super::{Hencky, Misfit, Model, MohrCoulomb, Response, StateVariable, softening};
@@ -54,21 +55,7 @@ impl Model for Tresca {
         self.pyramid.respond(trial, state)
     }
 
-    fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
-        self.pyramid.elastic_strain(stress)
-    }
-
-    fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
-        self.pyramid.energy(elastic_strain)
-    }
-
-    fn wave_modulus(&self, elastic_strain: impl FnOnce() -> [f64; 3]) -> f64 {
-        self.pyramid.wave_modulus(elastic_strain)
-    }
-
-    fn stiffness(&self) -> f64 {
-        self.pyramid.stiffness()
-    }
+    elastic_by!(pyramid);
 
     fn strength(&self) -> Option<f64> {
         Some(self.strength)

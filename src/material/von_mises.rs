@@ -7,6 +7,7 @@
 //! return is radial; its length x solves 2 mu (|dev trial| - x) = rho(alpha + sqrt(2/3) x), which is
 //! convex and falls in x: Newton's method from x = 0 comes up to the root and never passes it.
 
+use super::model::elastic_by;
 use super::parameter::{POISSON, POSITIVE, Parameter, YOUNG, at_least};
 use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
 
@@ -241,22 +242,7 @@ impl Model for VonMises {
         }
     }
 
-    fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {
-        self.elasticity.strain(stress)
-    }
-
-    #[inline(always)]
-    fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
-        self.elasticity.energy(elastic_strain)
-    }
-
-    fn wave_modulus(&self, _: impl FnOnce() -> [f64; 3]) -> f64 {
-        self.elasticity.p_wave_modulus()
-    }
-
-    fn stiffness(&self) -> f64 {
-        self.elasticity.young
-    }
+    elastic_by!(elasticity);
 
     fn strength(&self) -> Option<f64> {
         Some(self.radius)

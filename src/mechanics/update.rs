@@ -1,5 +1,5 @@
-//! eps_e,t = 1/2 ln(dF b_e,n dF^T): the trial elastic strain (Lagrangian §2) and what the
-//! material makes of it, in principal axes.
+//! eps_e,t = 1/2 ln(dF b_e,n dF^T): the trial elastic strain (Lagrangian §2) and the material's
+//! response to it, in principal axes.
 //!
 //! dF and b_e come and go without their units, as dF - 1 and b_e - 1: strains of 1e-7 in 1 + strain
 //! would keep nine digits only, and stiff bodies under small loads none that equilibrium needs.

@@ -1,6 +1,7 @@
-//! Sparse exchange: each rank knows whom it writes to, nobody knows whom it hears from. The
-//! non-blocking consensus of Hoefler, Siebert and Lumsdaine: synchronous sends, probes, and a
-//! barrier entered when the own sends are matched; its cost does not grow with the rank count.
+//! Sparse exchange: each rank knows to whom it sends, and no rank knows from whom it will receive. It
+//! is the non-blocking consensus of Hoefler, Siebert and Lumsdaine: synchronous sends, probes, and a
+//! barrier that a rank enters when all of its sends are matched. The cost does not grow with the number
+//! of ranks.
 
 use bytemuck::Pod;
 use mpi::point_to_point::{Message, Status};
@@ -49,7 +50,7 @@ pub fn exchange_in_messages<T: Pod>(
     world.fail_together(wrong)?;
     if world.size() > 1 {
         let per_message = (largest / size_of::<T>()).max(1);
-        traffic::waiting(|| swap(world, &remote, per_message, &mut incoming));
+        traffic::time_waiting(|| swap(world, &remote, per_message, &mut incoming));
     }
     incoming.retain(|(_, list)| !list.is_empty());
     incoming.sort_by_key(|(source, _)| *source);
@@ -72,14 +73,14 @@ pub fn send_lists<T: Pod>(world: &World, lists: &[(usize, Vec<T>)]) {
         })
     };
     if !lists.is_empty() {
-        traffic::waiting(send);
+        traffic::time_waiting(send);
     }
 }
 
 /// Waits for a list of unknown length from one rank.
 pub fn receive_list<T: Pod>(world: &World, rank: usize) -> Vec<T> {
     let process = world.comm().process_at_rank(rank as i32);
-    traffic::waiting(|| {
+    traffic::time_waiting(|| {
         let (message, status) = process.matched_probe_with_tag(LIST_TAG);
         receive(message, status)
     })

@@ -247,7 +247,7 @@ pub fn exchange_known<R>(
     }
     sends.iter().for_each(|(_, values)| traffic::count_message(size_of_val(&values[..])));
     mpi::request::multiple_scope(count, |scope, requests| {
-        traffic::waiting(|| {
+        traffic::time_waiting(|| {
             for (rank, buffer) in receives {
                 let process = comm.process_at_rank(rank as i32);
                 requests.add(process.immediate_receive_into_with_tag(scope, buffer, TAG));
@@ -258,7 +258,7 @@ pub fn exchange_known<R>(
             }
         });
         let done = work();
-        traffic::waiting(|| requests.wait_all(&mut Vec::with_capacity(count)));
+        traffic::time_waiting(|| requests.wait_all(&mut Vec::with_capacity(count)));
         done
     })
 }

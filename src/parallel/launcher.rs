@@ -1,5 +1,5 @@
 //! Whether the launcher that started this process belongs to the MPI that the program is linked with.
-//! One of another MPI starts n runs of one rank each.
+//! A launcher of another MPI starts n runs of one rank each.
 
 /// Variables by which launchers tell how many processes they have started: Open MPI's mpirun,
 /// those of MPICH and Intel MPI, srun. What Slurm grants to a job (`SLURM_NTASKS`) is not among them:
@@ -17,14 +17,14 @@ pub fn warning(
     library: &str,
     variable: impl Fn(&str) -> Option<String>,
 ) -> Option<String> {
-    let told: Vec<(&str, &str, usize)> = SIZES
+    let launched: Vec<(&str, &str, usize)> = SIZES
         .iter()
         .filter_map(|(name, who)| Some((*name, *who, variable(name)?.trim().parse().ok()?)))
         .collect();
-    if ranks > 1 || told.iter().any(|(_, _, size)| *size == ranks) {
+    if ranks > 1 || launched.iter().any(|(_, _, size)| *size == ranks) {
         return None;
     }
-    let (name, who, size) = told.into_iter().find(|(_, _, size)| *size > ranks)?;
+    let (name, who, size) = launched.into_iter().find(|(_, _, size)| *size > ranks)?;
     Some(format!(
         "warning: {who} has started {size} processes ({name}), and each of them is a run of its own \
          on 1 rank: this program is linked with {library}; start it with the mpirun of that library, \

@@ -1,5 +1,6 @@
-//! What this rank sends and how long it waits: counted where messages are made, so that a
-//! scaling study needs no clock. The linear solvers keep their own counts (`-log_view`).
+//! Bytes and messages that this rank sends, and the time it waits for others: counted where messages
+//! are made, so that a scaling study needs no profiler. The linear solvers keep their own counts
+//! (`-log_view`).
 
 use std::cell::Cell;
 use std::ops::Sub;
@@ -52,7 +53,7 @@ pub(crate) fn count_message(bytes: usize) {
 
 /// Runs a collective operation that is one reduction or its like.
 pub(crate) fn reducing<T>(act: impl FnOnce() -> T) -> T {
-    let outcome = waiting(act);
+    let outcome = time_waiting(act);
     let mut traffic = SO_FAR.get();
     traffic.reductions += 1;
     SO_FAR.set(traffic);
@@ -60,7 +61,7 @@ pub(crate) fn reducing<T>(act: impl FnOnce() -> T) -> T {
 }
 
 /// Runs a piece of communication on the clock.
-pub(crate) fn waiting<T>(act: impl FnOnce() -> T) -> T {
+pub(crate) fn time_waiting<T>(act: impl FnOnce() -> T) -> T {
     let begin = Instant::now();
     let outcome = act();
     let mut traffic = SO_FAR.get();

@@ -1,4 +1,4 @@
-//! Return codes to errors, and one rank's error to every rank's.
+//! PETSc's return codes become errors, and an error of one rank becomes an error of all.
 
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::sync::Mutex;

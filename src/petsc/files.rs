@@ -1,5 +1,5 @@
-//! Files that options name, tried before PETSc does: it opens them on one rank only, and where that
-//! fails the others wait for it for ever.
+//! Files that options name are opened by this program first. PETSc opens them on one rank only, and
+//! where that fails the other ranks wait for ever.
 
 use std::ffi::CString;
 use std::fs::{self, OpenOptions};

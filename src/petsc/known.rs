@@ -1,10 +1,9 @@
-//! Options that no solver knows, told before the run instead of never.
+//! Options that no solver knows are refused before the run. PETSc would ignore them.
 //!
-//! PETSc ignores what nobody asks for. Here each option that is still unread after the start is
-//! shown, under a name of its own, to solvers of all kinds that PETSc has: an option that none of
-//! them reads is a mistake. One that is known but not used by the run is only warned of at its end.
-//! Names that PETSc asks for later than that, or under prefixes of its own, cannot be had from it and
-//! are listed.
+//! Each option that is still unread after the start is shown, under a name of its own, to solvers of
+//! all kinds that PETSc has: an option that none of them reads is a mistake. A run warns at its end of
+//! an option that is known but was not used. PETSc cannot be asked for the names that it reads later,
+//! or under prefixes of its own: those are listed here.
 
 use std::ptr::null_mut;
 

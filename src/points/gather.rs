@@ -1,5 +1,6 @@
-//! The values of a field in another order, without fresh memory for every field: pages that the
-//! system has to clear cost more than the copies. Where few points change place, only those move.
+//! Puts the values of a field in another order. All fields share one buffer: the system would have to
+//! clear the pages of fresh memory, which costs more than the copies. Where few points change place,
+//! only those move.
 
 use std::any::Any;
 

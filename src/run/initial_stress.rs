@@ -38,7 +38,7 @@ pub fn set<const D: usize>(
                 true => "no elastic strain of the material gives it: check its parameters",
                 false => "an expression has no finite value there",
             };
-            fault = Some((points.id[p], told(deck, points, p, &stress, why)));
+            fault = Some((points.id[p], message_at(deck, points, p, &stress, why)));
         }
     }
     world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))
@@ -71,7 +71,7 @@ pub fn require_elastic<const D: usize>(
         }
     }
     let count = world.sum_usize(count);
-    let told = fault.map(|(id, p)| {
+    let message = fault.map(|(id, p)| {
         let stress = points.kirchhoff_stress[p];
         let others = match count {
             1 => String::new(),
@@ -82,13 +82,13 @@ pub fn require_elastic<const D: usize>(
              can hold (K0 nearer to one, or between the active and the passive limit), or more \
              strength"
         );
-        (id, told(deck, points, p, &stress, &why))
+        (id, message_at(deck, points, p, &stress, &why))
     });
-    world.lowest_message(told).map_or(Ok(()), |message| Err(Error::Input(message)))
+    world.lowest_message(message).map_or(Ok(()), |message| Err(Error::Input(message)))
 }
 
 /// A message about the initial stress of a point, with its place.
-fn told<const D: usize>(
+fn message_at<const D: usize>(
     deck: &Deck,
     points: &Points<D>,
     p: usize,

@@ -1,4 +1,5 @@
-//! What figures of a plan tell of slips: of units, by ratios that have no unit, and of sizes.
+//! Warnings that the plan prints: ratios without a unit that show a slip of units, and sizes that a run
+//! will hardly finish with.
 
 use std::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! What the C libraries are told of memory, which they would otherwise settle for the program.
+//! Settings for the C libraries' use of memory, made before they choose their own.
 
 /// Before MPI starts. Large blocks of the set-up get their own pages, so that arrays that grow there
 /// leave no holes in the heap; and hwloc, which MPI asks about the machine, is kept from loading

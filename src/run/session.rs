@@ -132,7 +132,7 @@ fn with_world(universe: &Universe, world: &World, arguments: &Arguments) -> Resu
     session.end(outcome)
 }
 
-/// Rank 0 reads; the others hear.
+/// Rank 0 reads the deck and sends its text to the others.
 fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
     let path = &arguments.input;
     let read = if world.is_root() {

@@ -1,5 +1,5 @@
-//! What waits for other ranks and what does not: points that touch nodes of another rank and
-//! those that do not; rows that read values of another rank and those that do not.
+//! Work in two parts, so that messages travel while the second is done: first the points that touch
+//! nodes of another rank and the rows that read values of another rank, then all others.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Which nodes meet: the union of the supports that hold each node, by rows.
+//! Which nodes share an equation: the union of the supports that hold a node is the node's row.
 
 /// Lists of small indices, one after the other.
 #[derive(Debug, Clone, Default)]

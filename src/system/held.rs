@@ -1,7 +1,7 @@
-//! Degrees of freedom that a condition holds, in the assembled rows: their rows and columns become
-//! the identity, scaled like the other diagonal entries so that smoothers see one scale. What that
-//! overwrites and is asked for again is kept: rows of fixed ones give reactions (Lagrangian §6.3),
-//! columns move to the right-hand side.
+//! Degrees of freedom that a condition holds, in the assembled rows. Their rows and columns become
+//! those of the identity, scaled like the other diagonal entries so that smoothers see one scale. The
+//! overwritten values are kept: those of the rows give the reactions (Lagrangian §6.3), those of the
+//! columns move prescribed displacements to the right-hand side.
 
 use super::numbering::Numbering;
 use super::pattern::Pattern;

@@ -1,6 +1,6 @@
 //! K_aibk += Σ_p g_aj A_ijkl g_bl V (Lagrangian eq. 27) for points that share their nodes: the
 //! products of a batch of points are summed in registers, tile by tile, and go straight into
-//! the sparse rows. The plain form is in `internal.rs`; a test compares the two.
+//! the sparse rows. The plain form is in `plain.rs`; a test compares the two.
 
 use crate::mechanics::dilation::{Dilation, Rows};
 use crate::mechanics::{Contribution, Hoop};

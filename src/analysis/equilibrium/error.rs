@@ -1,4 +1,5 @@
-//! |f_ext - f_int + f_react| / |f_ext + f_react| (Lagrangian eq. 40), and whether it is round-off.
+//! The error of an iterate, |f_ext - f_int + f_react| / |f_ext + f_react| (Lagrangian eq. 40), and
+//! whether what is left of it is round-off.
 
 use crate::analysis::round_off;
 use crate::error::Result;

@@ -77,9 +77,9 @@ impl Table<'_> {
                 chosen.push(at);
                 Ok(())
             };
-            // All of them, so that every unknown word is told.
-            let told: Vec<Got<()>> = self.items(key, node)?.iter().map(&mut one).collect();
-            told.into_iter().collect::<Got<()>>()?;
+            // All of them, so that every unknown word is reported.
+            let words: Vec<Got<()>> = self.items(key, node)?.iter().map(&mut one).collect();
+            words.into_iter().collect::<Got<()>>()?;
             Ok(chosen)
         });
         Ok(found?.unwrap_or_default())

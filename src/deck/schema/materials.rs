@@ -96,12 +96,12 @@ fn united(parameter: &Parameter) -> Key {
     if !needed.is_empty() {
         parts.push(format!("needed by {needed}"));
     }
-    let mut told: Vec<&str> = Vec::new();
+    let mut meanings: Vec<&str> = Vec::new();
     for (_, known) in &uses {
         if let Absence::Means(_, means) = known.absence
-            && !told.contains(&means)
+            && !meanings.contains(&means)
         {
-            told.push(means);
+            meanings.push(means);
             let which = names(&|other| matches!(other.absence, Absence::Means(_, m) if m == means));
             parts.push(if everywhere { means.to_string() } else { format!("{which}: {means}") });
         }

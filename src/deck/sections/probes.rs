@@ -78,7 +78,7 @@ fn selectors(table: &Table<'_>, dimension: usize) -> Got<Vec<String>> {
         };
         Err(table.unknown_word("fields", word, &known, &item.origin))
     });
-    // All of them, so that every unknown word is told.
-    let told: Vec<Got<String>> = each.collect();
-    told.into_iter().collect()
+    // All of them, so that every unknown word is reported.
+    let words: Vec<Got<String>> = each.collect();
+    words.into_iter().collect()
 }

@@ -146,13 +146,13 @@ pub fn check(
 ) -> Got<()> {
     let mut result = Ok(());
     let mut report = |section: &str, index: usize, key: &str, what: String, help: &str| {
-        let told = root.tables(section, |at, table| {
+        let reported = root.tables(section, |at, table| {
             if at != index {
                 return Ok(());
             }
             Err(table.problem_with_help(key, &what, help))
         });
-        result = told.map(drop);
+        result = reported.map(drop);
     };
     let quasi_static = kind.is_static();
     let changes = |stage: usize| {

@@ -1,4 +1,4 @@
-//! A csv file that grows row by row and is readable at any moment; the first column is the step.
+//! A csv file that grows row by row and can be read at any moment. The first column is the step.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Write;

@@ -41,7 +41,7 @@ impl Contest {
         let contested: Vec<usize> = (0..self.holder.len()).filter(both).collect();
         let count = world.sum_usize(contested.len());
         let first = contested.into_iter().min_by_key(|dof| (numbering.nodes[dof / D], dof % D));
-        let told = first.and_then(|dof| {
+        let message = first.and_then(|dof| {
             let (holder, mover) = (self.holder[dof]?, self.mover[dof]?);
             let name = |index: u32| &deck.boundaries[index as usize].name;
             let node = numbering.nodes[dof / D];
@@ -55,6 +55,6 @@ impl Contest {
             );
             Some(((node * D + dof % D) as u64, text))
         });
-        world.lowest_message(told)
+        world.lowest_message(message)
     }
 }
