@@ -141,7 +141,12 @@ pub const FIELDS: &[Field] = &[
     field("mass", FieldRank::Scalar, "kg", "Per metre of thickness in plane strain"),
     field("half_length", FieldRank::Vector, "m", "Half lengths of the point's domain"),
     field("point_force", FieldRank::Vector, "N", "Held force at full load"),
-    field("id", FieldRank::Integer, "-", "Stable number of the point; some are left out"),
+    field(
+        "id",
+        FieldRank::Integer,
+        "-",
+        "Number of the point, from 0 on without gaps, body by body; it stays",
+    ),
     field("body", FieldRank::Integer, "-", "Number of the deck's body, from 0"),
     field("rank", FieldRank::Integer, "-", "Rank that owns the point"),
 ];

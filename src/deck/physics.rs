@@ -122,7 +122,7 @@ pub fn physics(deck: &Deck) -> String {
     }
     for body in &mut deck.bodies {
         match &mut body.source {
-            BodySource::File(path) => name_only(path),
+            BodySource::File(file) => name_only(&mut file.path),
             BodySource::Shape { shape, .. } => shape.rename_files(&name_only),
             BodySource::MeshCells { .. } => {}
         }

@@ -33,14 +33,15 @@ pub const SERIES_HEAD: &str = "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n\
      <Grid Name=\"series\" GridType=\"Collection\" CollectionType=\"Temporal\">\n";
 
 /// Lists of frames for ParaView, and how they begin.
-pub const PVD: &str = "points.pvd";
+pub const PVDS: [&str; 3] = ["points.pvd", "domains.pvd", "grid.pvd"];
 pub const PVD_HEAD: &str =
     "<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"1.0\">\n<Collection>\n";
-pub const SERIES: &str = "points.vtkhdf.series";
+pub const SERIES: [&str; 3] =
+    ["points.vtkhdf.series", "domains.vtkhdf.series", "grid.vtkhdf.series"];
 pub const SERIES_LIST_HEAD: &str = "{\"file-series-version\":\"1.0\",\"files\":[\n";
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [&str; 15] = [
+const NAMES: [&str; 13] = [
     SUMMARY,
     HISTORY,
     PROBES,
@@ -50,15 +51,16 @@ const NAMES: [&str; 15] = [
     LOG,
     DECK,
     RESOLVED_DECK,
-    PVD,
-    SERIES,
     "points.xdmf",
     "grid.xdmf",
     "domains.xdmf",
     RIGID,
 ];
 /// `points-000005.h5` and its like.
-const NUMBERED: [&str; 4] = ["points-", "grid-", "rigid-", "checkpoint-"];
+const NUMBERED: [&str; 5] = ["points-", "domains-", "grid-", "rigid-", "checkpoint-"];
+/// Frames, and those that may be VTU files.
+const FRAMES: [&str; 4] = ["points-", "domains-", "grid-", "rigid-"];
+const VTU_FRAMES: [&str; 3] = ["points-", "domains-", "grid-"];
 /// Digits of a frame's and a checkpoint's number, at least.
 const DIGITS: usize = 6;
 
@@ -81,7 +83,8 @@ pub fn names_in(folder: &Path) -> Result<Vec<String>> {
 fn is_ours(name: &str) -> bool {
     let name = without_ending(name);
     let numbered = NUMBERED.iter().any(|begin| number_of(name, begin).is_some());
-    NAMES.contains(&name) || numbered || frame_of(name).is_some()
+    let listed = NAMES.contains(&name) || PVDS.contains(&name) || SERIES.contains(&name);
+    listed || numbered || frame_of(name).is_some()
 }
 
 /// Number of the finished file `begin`NNNNNN.h5; `None` for other names.
@@ -92,8 +95,11 @@ pub fn number_of(name: &str, begin: &str) -> Option<usize> {
 
 /// Step of the frame that a file belongs to; `None` for other names.
 pub fn frame_of(name: &str) -> Option<usize> {
-    let hdf5 = ["points-", "grid-", "rigid-"].iter().find_map(|begin| number_of(name, begin));
-    hdf5.or_else(|| number_of(&format!("{}.h5", name.strip_suffix(".vtu")?), "points-"))
+    if let Some(stem) = name.strip_suffix(".vtu") {
+        let name = format!("{stem}.h5");
+        return VTU_FRAMES.iter().find_map(|begin| number_of(&name, begin));
+    }
+    FRAMES.iter().find_map(|begin| number_of(name, begin))
 }
 
 fn without_ending(name: &str) -> &str {
@@ -124,6 +130,9 @@ mod tests {
             "points-000005.vtu",
             "points-000005.vtu.superseded",
             "points.pvd.partial",
+            "grid-000005.vtu",
+            "domains-000005.h5",
+            "domains.vtkhdf.series",
         ] {
             assert!(is_ours(name), "{name}");
         }
@@ -134,7 +143,8 @@ mod tests {
             "my-points-000005.h5",
             "notes.txt",
             "grid.h5",
-            "grid-000005.vtu",
+            "grid-5.vtu",
+            "rigid-000005.vtu",
             ".mpm-par.lock",
         ] {
             assert!(!is_ours(name), "{name}");

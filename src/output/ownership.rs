@@ -10,7 +10,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::names::{
-    DECK, ELEMENT, HISTORY, LOG, PROBES, PVD, PVD_HEAD, REPORT, RESIDUALS, RESOLVED_DECK, RIGID,
+    DECK, ELEMENT, HISTORY, LOG, PROBES, PVD_HEAD, PVDS, REPORT, RESIDUALS, RESOLVED_DECK, RIGID,
     SERIES, SERIES_HEAD, SERIES_LIST_HEAD, SUMMARY, names_in,
 };
 use super::report;
@@ -37,7 +37,7 @@ enum Proof {
 }
 
 /// All names that a run may leave, apart from the numbered ones.
-const NAMES: [(&str, Proof); 15] = [
+const NAMES: [(&str, Proof); 13] = [
     (SUMMARY, Proof::Summary),
     (HISTORY, Proof::Begins(TABLE_HEAD)),
     (RESIDUALS, Proof::Begins(TABLE_HEAD)),
@@ -47,8 +47,6 @@ const NAMES: [(&str, Proof); 15] = [
     (LOG, Proof::Begins(LOG_HEAD)),
     (DECK, Proof::Company),
     (RESOLVED_DECK, Proof::Company),
-    (PVD, Proof::Begins(PVD_HEAD)),
-    (SERIES, Proof::Begins(SERIES_LIST_HEAD)),
     ("points.xdmf", Proof::Begins(SERIES_HEAD)),
     ("grid.xdmf", Proof::Begins(SERIES_HEAD)),
     ("domains.xdmf", Proof::Begins(SERIES_HEAD)),
@@ -114,6 +112,12 @@ pub fn list(names: &[String]) -> String {
 
 /// Of a file whose name ends in `.partial` and its like no content can be expected.
 fn proof_of(name: &str) -> Proof {
+    if PVDS.contains(&name) {
+        return Proof::Begins(PVD_HEAD);
+    }
+    if SERIES.contains(&name) {
+        return Proof::Begins(SERIES_LIST_HEAD);
+    }
     let fixed = NAMES.iter().find(|(fixed, _)| *fixed == name);
     fixed.map_or(Proof::Company, |(_, proof)| *proof)
 }

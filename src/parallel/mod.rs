@@ -12,6 +12,7 @@
 //! | `partition.rs` | owner of each unit, cell and node |
 //! | `migrate.rs` | points to the ranks that own their cells |
 //! | `nearest.rs` | the point nearest to a place |
+//! | `number.rs` | numbers of points without gaps |
 //! | `traffic.rs` | messages, bytes and reductions, counted |
 //! | `launcher.rs` | whether the launcher belongs to this MPI |
 //! | `signals.rs` | SIGTERM and SIGUSR1 as a wish of all ranks |
@@ -26,6 +27,7 @@ pub(crate) mod launcher;
 pub(crate) mod metis;
 pub mod migrate;
 pub(crate) mod nearest;
+pub(crate) mod number;
 pub mod partition;
 pub(crate) mod signals;
 pub(crate) mod traffic;

@@ -63,6 +63,8 @@ macro_rules! point_fields {
             pub affine: bool,
             /// `displacement_start` is carried: a stage resets the displacement.
             pub counts_anew: bool,
+            /// Their identities go from 0 on without gaps, over all bodies of the deck.
+            pub counted: bool,
             /// What stands in the pores of all points.
             pub water: Option<Water>,
         }
@@ -314,6 +316,7 @@ impl<const D: usize> Points<D> {
             cornerless: self.cornerless,
             affine: self.affine,
             counts_anew: self.counts_anew,
+            counted: self.counted,
             water: self.water,
             state: self.state.empty_like(),
             parameters: self.parameters.empty_like(),

@@ -78,7 +78,8 @@ fn overlap(deck: &Deck, first: usize, second: usize, how: String) -> Error {
 /// Bodies of one file, or of the same cells of a mesh.
 fn same_source<const D: usize>(grid: &Grid<D>, one: &Body, other: &Body) -> Result<bool> {
     match (&one.source, &other.source, grid) {
-        (BodySource::File(a), BodySource::File(b), _) => Ok(a == b),
+        (BodySource::File(a), BodySource::File(b), _) => Ok(a.path == b.path
+            && (a.of_body == b.of_body || a.of_body.is_none() || b.of_body.is_none())),
         (BodySource::MeshCells { tag: a, .. }, BodySource::MeshCells { tag: b, .. }, grid) => {
             let (Some(a), Some(b), Grid::Mesh(mesh)) = (a, b, grid) else { return Ok(true) };
             let cells = mesh.tagged_cells(a)?;

@@ -1,7 +1,7 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
 use crate::deck::fields::{self, FieldRank};
-use crate::deck::model::{Basis, Body, BodySource, Symmetry};
+use crate::deck::model::{Basis, Body, BodySource, Format, Symmetry};
 use crate::deck::rough;
 use crate::output::terminal::report::Plan;
 use crate::parallel::World;
@@ -82,16 +82,27 @@ const BYTES_PER_NODE: f64 = 200.0;
 /// A row of history.csv, residuals.csv and log.txt.
 const BYTES_PER_STEP: f64 = 1500.0;
 
-/// A point in a frame: place, identity, body, rank, fields, and the corners of its domain.
+/// A point in a frame: place, identity, body, rank, fields, and the corners of its domain, in each format.
 fn bytes_per_point<const D: usize>(deck: &crate::deck::Deck) -> f64 {
     let numbers = |name: &String| match fields::rank(name) {
         Some(FieldRank::Vector) => 3,
         Some(rank) => rank.components(3).len().max(1),
         None => 1,
     };
-    let corners = if deck.method.basis == Basis::Mpm { 0 } else { 3 << D };
-    let fields: usize = deck.output.fields.iter().map(numbers).sum();
-    8.0 * (3 + 1 + 3 + fields + corners) as f64
+    let (corners, corner_numbers) = match deck.method.basis {
+        Basis::Mpm => (0, 0),
+        _ => (3 << D, 1 << D),
+    };
+    let own = 7 + deck.output.fields.iter().map(numbers).sum::<usize>();
+    let domains = usize::from(corners > 0);
+    let more = |format: &Format| match format {
+        Format::Xdmf => 0,
+        // The fields again, at points and on domains.
+        Format::Vtu => own + 2 + domains * (own + corners + corner_numbers + 2),
+        Format::VtkHdf => 2 + domains * (corner_numbers + 2),
+    };
+    let more: usize = deck.output.formats.iter().map(more).sum();
+    8.0 * (own + corners + corner_numbers + more) as f64
 }
 
 /// Volume of each body's points beside that of its shape, where the two differ or a shape is not

@@ -14,6 +14,7 @@ use crate::loads::{self, Found, Manufactured};
 use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
 use crate::parallel::nearest::require_near;
+use crate::parallel::number::close_gaps;
 use crate::parallel::{self, Partition, World};
 use crate::points::overlap;
 use crate::points::seed::{self, CellByCell};
@@ -44,6 +45,7 @@ pub fn prepare<const D: usize>(world: &World, mut deck: Deck) -> Result<(Model<D
     };
     let seeding = CellByCell::new(&deck, &grid, first_ids)?;
     parallel::distribute_seeded(world, &partition, &grid, &mut points, cells, &seeding)?;
+    close_gaps(world, &mut points)?;
     let mut found = find_carriers(world, &deck, &grid, &points)?;
     hold_constant_forces(&deck, &mut found, &mut points);
     let materials = materials::of_bodies(&deck);
@@ -80,15 +82,19 @@ fn set_aside<const D: usize>(points: &mut Points<D>, bodies: &[bool]) -> Points<
 }
 
 /// All points of the deck as they were seeded, with what their materials ask for: what a
-/// continuation needs of bodies that are not there. Collective.
+/// continuation needs of bodies that are not there. `counted`: as the checkpoint's points are. Collective.
 fn seeded<const D: usize>(
     world: &World,
     deck: &Deck,
     grid: &Grid<D>,
     materials: &[Material],
+    counted: bool,
 ) -> Result<Points<D>> {
     let share = Share { rank: world.rank(), ranks: world.size() };
     let (mut points, _) = world.fail_together(seed::seed(deck, grid, share))?;
+    if counted {
+        close_gaps(world, &mut points)?;
+    }
     materials::equip(world, deck, materials, &mut points, Stresses::Initial)?;
     Ok(points)
 }
@@ -104,7 +110,7 @@ pub fn restore<const D: usize>(
     set_cell_size(&mut deck, &grid);
     let materials = materials::of_bodies(&deck);
     let all = match deck.has_passing_bodies() {
-        true => Some(seeded(world, &deck, &grid, &materials)?),
+        true => Some(seeded(world, &deck, &grid, &materials, restored.points.counted)?),
         false => None,
     };
     let Restored { ranks, mut points, mesh_positions, brick, owners, .. } = restored;

@@ -124,14 +124,59 @@ pub struct K0 {
     pub axis: usize,
 }
 
+/// A file of points: csv, or VTK (.vtu, .vtp, .vtk).
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointsFile {
+    /// Joined to the deck's folder.
+    pub path: PathBuf,
+    /// Only the points with this number of a body.
+    pub of_body: Option<usize>,
+    pub names: PointNames,
+}
+
+impl PointsFile {
+    /// The ending of its name in small letters.
+    pub fn ending(&self) -> String {
+        let ending = self.path.extension().unwrap_or_default();
+        ending.to_string_lossy().to_ascii_lowercase()
+    }
+}
+
+/// What a file calls its columns or arrays, where not by the usual names.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct PointNames {
+    /// Columns of x, y, z, and of the velocity along them.
+    pub axes: [Option<String>; 3],
+    pub rates: [Option<String>; 3],
+    pub volume: Option<String>,
+    /// Array of a VTK file.
+    pub velocity: Option<String>,
+    pub body: Option<String>,
+}
+
+impl PointNames {
+    /// Key and name, in the order of the schema.
+    pub fn pairs(&self) -> Vec<(&'static str, &str)> {
+        let keys = ["x", "y", "z", "vx", "vy", "vz", "volume", "velocity", "body"];
+        let own = [&self.volume, &self.velocity, &self.body];
+        let all = self.axes.iter().chain(&self.rates).chain(own);
+        keys.into_iter().zip(all).filter_map(|(k, name)| Some((k, name.as_deref()?))).collect()
+    }
+
+    /// Whether any is given.
+    pub fn any(&self) -> bool {
+        !self.pairs().is_empty()
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub enum BodySource {
     Shape {
         shape: Shape,
         seeding: Seeding,
     },
-    /// csv with header `x,y[,z],volume[,vx,vy,vz]`; path already joined to the deck's folder.
-    File(PathBuf),
+    /// Points of a file.
+    File(PointsFile),
     /// All cells of a mesh, or those with this physical tag.
     MeshCells {
         tag: Option<String>,

@@ -102,7 +102,7 @@ impl Deck {
     /// The files that the deck names: points of bodies, the mesh.
     pub fn files(&self) -> Vec<PathBuf> {
         let points = self.bodies.iter().filter_map(|body| match &body.source {
-            BodySource::File(path) => Some(path.clone()),
+            BodySource::File(file) => Some(file.path.clone()),
             _ => None,
         });
         let mesh = match &self.grid {

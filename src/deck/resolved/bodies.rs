@@ -24,9 +24,15 @@ pub(super) fn materials_and_bodies(w: &mut Writer<'_>, deck: &Deck) {
                 w.line("body", "shape", shape(region));
                 Some(seeding)
             }
-            BodySource::File(path) => {
-                let path = quote(&path.display().to_string());
-                w.line("body", "shape", inline(&[("points", path)]));
+            BodySource::File(file) => {
+                let mut pairs = vec![("points", quote(&file.path.display().to_string()))];
+                pairs.extend(file.of_body.map(|number| ("of_body", number.to_string())));
+                if file.names.any() {
+                    let names = file.names.pairs().into_iter();
+                    let names: Vec<_> = names.map(|(key, name)| (key, quote(name))).collect();
+                    pairs.push(("names", inline(&names)));
+                }
+                w.line("body", "shape", inline(&pairs));
                 None
             }
             BodySource::MeshCells { tag, seeding } => {

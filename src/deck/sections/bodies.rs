@@ -5,7 +5,8 @@ use std::path::Path;
 use super::{initial_stress, shapes, stages};
 use crate::deck::expression::Expression;
 use crate::deck::model::{
-    Analysis, Basis, Body, BodySource, Grid, LatticeGrid, MeshMotion, MeshSource, Method, Seeding,
+    Analysis, Basis, Body, BodySource, Grid, LatticeGrid, MeshMotion, MeshSource, Method,
+    PointNames, PointsFile, Seeding,
 };
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
@@ -129,6 +130,18 @@ fn density(table: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<f64> {
     Ok(density)
 }
 
+/// Names of columns and arrays.
+fn point_names(table: &Table<'_>) -> Got<PointNames> {
+    let name = |key: &str| table.text_if(key);
+    Ok(PointNames {
+        axes: [name("x")?, name("y")?, name("z")?],
+        rates: [name("vx")?, name("vy")?, name("vz")?],
+        volume: name("volume")?,
+        velocity: name("velocity")?,
+        body: name("body")?,
+    })
+}
+
 fn source(body: &Table<'_>, shape: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<BodySource> {
     let seeds = ["points_per_cell", "lattice", "gauss"];
     let placed = ["rotate", "translate"];
@@ -137,8 +150,25 @@ fn source(body: &Table<'_>, shape: &Table<'_>, earlier: &EarlierSections<'_>) ->
         shape.refuse(&["cells"], "points come from a file; leave one of them out")?;
         shape.refuse(&placed, "points of a file stay where they are")?;
         body.refuse(&seeds, "points come from a file")?;
-        return Ok(BodySource::File(earlier.directory.join(shape.text("points")?)));
+        let path = shape.text("points").map(|name| earlier.directory.join(name));
+        let of_body = shape.count_if("of_body");
+        let names = shape.table_if("names", |names| point_names(&names));
+        let (path, of_body, names) = (path?, of_body?, names?.unwrap_or_default());
+        let file = PointsFile { path, of_body, names };
+        let vtk = matches!(&file.ending()[..], "vtu" | "vtp" | "vtk");
+        for (key, _) in file.names.pairs() {
+            if vtk && key.len() <= 2 {
+                let why = "a VTK file has its places and velocities in arrays; leave it out";
+                return Err(shape.problem("names", format!("{key}: {why}")));
+            }
+            if !vtk && key == "velocity" {
+                let why = "velocity: a table has a column for each component: vx, vy, vz";
+                return Err(shape.problem("names", why));
+            }
+        }
+        return Ok(BodySource::File(file));
     }
+    shape.refuse(&["of_body", "names"], "only beside points")?;
     if shape.given("cells") {
         shape.refuse(&shapes::FORMS, "cells of the mesh are given; leave one of them out")?;
         shape.refuse(&placed, "cells of the mesh stay where they are")?;

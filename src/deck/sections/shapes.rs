@@ -38,7 +38,7 @@ pub fn shape(table: &Table<'_>, directory: &Path, dimension: usize, depth: usize
         return Err(table.problem("", format!("shapes are nested more than {DEEPEST} deep")));
     }
     if depth > 0 {
-        table.refuse(&["points", "cells"], "only directly in a body")?;
+        table.refuse(&["points", "cells", "of_body", "names"], "only directly in a body")?;
     }
     let name = table.one_of(&FORMS)?;
     let form = form(table, name, directory, dimension, depth);

@@ -74,6 +74,7 @@ impl<const D: usize> Checkpoint<'_, D> {
         file.write_number("ranks", &(comm.size() as u64))?;
         file.write_number("dimension", &(D as u64))?;
         file.write_number("brick", &(self.brick.unwrap_or(0) as u64))?;
+        file.write_number("counted", &u64::from(self.points.counted))?;
         let mut out = Writer { file, comm, sums: Vec::new() };
 
         out.text("text.physics", self.physics)?;
@@ -233,7 +234,9 @@ fn content<const D: usize>(input: &Reader<'_>, path: &Path) -> Result<Restored<D
         None
     };
     let rank_rows = input.whole::<u64>("rank_rows")?;
-    let points = input.points(&rank_rows)?;
+    let mut points = input.points(&rank_rows)?;
+    // Earlier versions left numbers out.
+    points.counted = number("counted").is_ok_and(|counted| counted == 1);
     let brick = (brick > 0).then_some(brick);
     let path = path.to_path_buf();
     Ok(Restored { path, step, ranks, state, points, mesh_positions, brick, owners })

@@ -4,16 +4,19 @@
 //! |---|---|---|
 //! | `points.pvd` | `points-*.vtu` | ParaView, VisIt |
 //! | `points.vtkhdf.series` | `points-*.h5`, which are VTKHDF files then | ParaView |
+//!
+//! and likewise for `domains` and `grid`.
 
 use std::fs;
 
 use mpi::topology::SimpleCommunicator;
 
 use super::growing_file::GrowingFile;
+use crate::deck::model::Format;
 use crate::error::Result;
 use crate::output::agreement::on_root;
 use crate::output::directory::ResultsDirectory;
-use crate::output::names::{PVD, PVD_HEAD, SERIES, SERIES_LIST_HEAD};
+use crate::output::names::{PVD_HEAD, SERIES_LIST_HEAD};
 use crate::output::whole_file::cannot_read;
 
 /// Which list.
@@ -24,10 +27,19 @@ pub enum Kind {
 }
 
 impl Kind {
-    fn name(self) -> &'static str {
+    /// The lists that a deck's formats ask for.
+    pub fn of(formats: &[Format]) -> impl Iterator<Item = Kind> + use<'_> {
+        formats.iter().filter_map(|format| match format {
+            Format::Xdmf => None,
+            Format::VtkHdf => Some(Kind::Series),
+            Format::Vtu => Some(Kind::Pvd),
+        })
+    }
+
+    fn name(self, frames: &str) -> String {
         match self {
-            Kind::Pvd => PVD,
-            Kind::Series => SERIES,
+            Kind::Pvd => format!("{frames}.pvd"),
+            Kind::Series => format!("{frames}.vtkhdf.series"),
         }
     }
 
@@ -39,14 +51,14 @@ impl Kind {
     }
 
     /// A line of its own.
-    fn piece(self, step: usize, time: f64, first: bool) -> String {
+    fn piece(self, frames: &str, step: usize, time: f64, first: bool) -> String {
         match self {
             Kind::Pvd => format!(
-                "<DataSet timestep=\"{time:e}\" part=\"0\" file=\"points-{step:06}.vtu\"/>\n"
+                "<DataSet timestep=\"{time:e}\" part=\"0\" file=\"{frames}-{step:06}.vtu\"/>\n"
             ),
             Kind::Series => {
                 let comma = if first { "" } else { "," };
-                format!("{comma}{{\"name\":\"points-{step:06}.h5\",\"time\":{time:e}}}\n")
+                format!("{comma}{{\"name\":\"{frames}-{step:06}.h5\",\"time\":{time:e}}}\n")
             }
         }
     }
@@ -56,6 +68,8 @@ impl Kind {
 #[derive(Debug)]
 pub struct FrameList {
     kind: Kind,
+    /// `points`, `domains` or `grid`.
+    frames: &'static str,
     file: GrowingFile,
     /// Step and line of each frame; on rank 0 only.
     pieces: Vec<(usize, String)>,
@@ -64,26 +78,28 @@ pub struct FrameList {
 }
 
 impl FrameList {
-    pub fn new(directory: &ResultsDirectory, kind: Kind) -> Self {
+    pub fn new(directory: &ResultsDirectory, frames: &'static str, kind: Kind) -> Self {
         let (head, tail) = kind.ends();
-        let file = GrowingFile::new(&directory.file(kind.name()), head, tail);
-        FrameList { kind, file, pieces: Vec::new(), longer: false }
+        let file = GrowingFile::new(&directory.file(&kind.name(frames)), head, tail);
+        FrameList { kind, frames, file, pieces: Vec::new(), longer: false }
     }
 
     /// Continues the list of an earlier run, up to and including `last_step`; one that is not there
     /// begins anew. Nothing is written before [`Self::cut`].
     pub fn resume(
         directory: &ResultsDirectory,
+        frames: &'static str,
         kind: Kind,
         last_step: usize,
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
-        let mut list = Self::new(directory, kind);
+        let mut list = Self::new(directory, frames, kind);
         on_root(comm, || {
             let path = list.file.path();
             if path.exists() {
                 let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
-                let all: Vec<(usize, String)> = text.lines().filter_map(numbered).collect();
+                let all: Vec<(usize, String)> =
+                    text.lines().filter_map(|line| numbered(frames, line)).collect();
                 let before = all.len();
                 list.pieces = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
                 list.longer = list.pieces.len() < before;
@@ -108,7 +124,8 @@ impl FrameList {
     /// Adds a frame.
     pub fn push(&mut self, step: usize, time: f64, comm: &SimpleCommunicator) -> Result<()> {
         on_root(comm, || {
-            self.pieces.push((step, self.kind.piece(step, time, self.pieces.is_empty())));
+            self.pieces
+                .push((step, self.kind.piece(self.frames, step, time, self.pieces.is_empty())));
             self.file.push(texts(&self.pieces))
         })
     }
@@ -119,8 +136,8 @@ fn texts(pieces: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
 }
 
 /// The step that a line names, and the line.
-fn numbered(line: &str) -> Option<(usize, String)> {
-    let rest = line.split("points-").nth(1)?;
+fn numbered(frames: &str, line: &str) -> Option<(usize, String)> {
+    let rest = line.split(&format!("\"{frames}-")).nth(1)?;
     let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
     Some((digits.parse().ok()?, format!("{line}\n")))
 }
@@ -134,9 +151,9 @@ mod tests {
         for kind in [Kind::Pvd, Kind::Series] {
             let (head, tail) = kind.ends();
             let pieces: Vec<String> =
-                [0, 5, 1_000_000].map(|s| kind.piece(s, 0.1 * s as f64, s == 0)).to_vec();
+                [0, 5, 1_000_000].map(|s| kind.piece("points", s, 0.1 * s as f64, s == 0)).to_vec();
             let text = format!("{head}{}{tail}", pieces.concat());
-            let found: Vec<_> = text.lines().filter_map(numbered).collect();
+            let found: Vec<_> = text.lines().filter_map(|line| numbered("points", line)).collect();
             let expected: Vec<_> = [0, 5, 1_000_000].into_iter().zip(pieces).collect();
             assert_eq!(found, expected);
             if kind == Kind::Series {

@@ -2,7 +2,10 @@
 
 use mpi::topology::{Communicator, SimpleCommunicator};
 
+use super::frame_list::{FrameList, Kind};
 use super::hdf5_writer::FileWriter;
+use super::vtkhdf::{self, Group, Nodes, Source};
+use super::vtu::{self, Array, Frame};
 use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfSeries};
 use crate::deck::model::{Element, Format};
 use crate::error::Result;
@@ -43,15 +46,15 @@ fn topology_of(element: Element) -> Topology {
 pub struct GridSeries {
     directory: ResultsDirectory,
     series: XdmfSeries,
-    /// `grid.xdmf` is written.
-    described: bool,
+    formats: Vec<Format>,
+    lists: Vec<FrameList>,
 }
 
 impl GridSeries {
     pub fn create(directory: &ResultsDirectory, formats: &[Format]) -> Self {
         let series = XdmfSeries::new(&directory.file("grid.xdmf"));
-        let described = formats.contains(&Format::Xdmf);
-        Self { directory: directory.clone(), series, described }
+        let lists = Kind::of(formats).map(|kind| FrameList::new(directory, "grid", kind)).collect();
+        Self { directory: directory.clone(), series, formats: formats.to_vec(), lists }
     }
 
     /// Continues the series of a run that is restarted after `last_step`. Nothing is written before
@@ -64,7 +67,10 @@ impl GridSeries {
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let mut this = Self::create(directory, formats);
-        if this.described {
+        let resumed = Kind::of(formats)
+            .map(|kind| FrameList::resume(directory, "grid", kind, last_step, comm));
+        this.lists = resumed.collect::<Result<_>>()?;
+        if formats.contains(&Format::Xdmf) {
             let path = directory.file("grid.xdmf");
             this.series = XdmfSeries::resume(&path, "grid-", last_step, log, comm)?;
         }
@@ -73,6 +79,9 @@ impl GridSeries {
 
     /// [`XdmfSeries::cut`]
     pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
+        for list in &mut self.lists {
+            list.cut(comm)?;
+        }
         self.series.cut(comm)
     }
 
@@ -144,7 +153,31 @@ impl GridSeries {
             file.write_rows(name, 1, values)?;
             attribute(name, Center::Cell, Number::Float, 1);
         }
+        if self.formats.contains(&Format::VtkHdf) {
+            let of = |center: Center| {
+                let own = attributes.iter().filter(move |attribute| attribute.center == center);
+                own.map(|attribute| attribute.name.as_str()).collect()
+            };
+            let group = Group {
+                source: Source::Here,
+                topology,
+                points: nodes,
+                cells,
+                places: "coordinates",
+                nodes: Nodes::Given(frame.connectivity),
+                point_data: of(Center::Node),
+                cell_data: of(Center::Cell),
+            };
+            vtkhdf::add(&file, &group, comm)?;
+        }
         file.finish()?;
+        if self.formats.contains(&Format::Vtu) {
+            let path = self.directory.file(&format!("grid-{step:06}.vtu"));
+            vtu::write(&path, time, as_vtu(frame, &flags, rank), comm)?;
+        }
+        for list in &mut self.lists {
+            list.push(step, time, comm)?;
+        }
 
         let snapshot = Snapshot {
             step,
@@ -154,7 +187,45 @@ impl GridSeries {
             geometry: item(Number::Float, all_nodes, 3, "coordinates"),
             attributes,
         };
-        if self.described { self.series.push(&snapshot, comm) } else { Ok(()) }
+        match self.formats.contains(&Format::Xdmf) {
+            true => self.series.push(&snapshot, comm),
+            false => Ok(()),
+        }
+    }
+}
+
+/// `flags`: `ghost_boundary` as numbers.
+fn as_vtu<'a, const D: usize>(
+    frame: &'a GridFrame<'_, D>,
+    flags: &'a [i64],
+    rank: i64,
+) -> Frame<'a> {
+    let (nodes, cells) = (frame.coordinates.len(), flags.len());
+    let vectors = |name, values: &'a [[f64; D]]| {
+        Array::floats(name, 3, move || in_space(values)).with_components(&["x", "y", "z"])
+    };
+    let numbers = |fields: &'a [(&str, &[f64])]| {
+        fields.iter().map(|(name, values)| Array::floats(name, 1, || values.to_vec()))
+    };
+    let mut point_data = vec![
+        vectors("displacement_increment", frame.displacement_increment),
+        vectors("reaction", frame.reaction),
+    ];
+    point_data.extend(numbers(frame.node_fields));
+    point_data.push(Array::integers("node_rank", move || vec![rank; nodes]));
+    let mut cell_data = vec![
+        Array::integers("cell_rank", move || vec![rank; cells]),
+        Array::integers("ghost_boundary", || flags.to_vec()),
+    ];
+    cell_data.extend(numbers(frame.cell_fields));
+    Frame {
+        topology: topology_of(frame.element),
+        points: nodes,
+        cells,
+        places: Box::new(|| in_space(frame.coordinates)),
+        connectivity: Some(frame.connectivity),
+        point_data,
+        cell_data,
     }
 }
 

@@ -1,14 +1,14 @@
 //! `points-000005.h5` per output step, `points.xdmf` over all of them, and `domains.xdmf`, which
 //! shows the same data on the points' sub-domains.
 
-use hdf5::types::FixedAscii;
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::domains;
 use super::frame_list::{FrameList, Kind};
 use super::hdf5_writer::FileWriter;
 use super::point_field::{PointField, Quantity, append_vector};
-use super::vtu::{self, VERTEX};
+use super::vtkhdf::{self, Group, Nodes, Source};
+use super::vtu::{self, Array, Frame};
 use super::xdmf::{Attribute, Center, DataItem, Number, Snapshot, Topology, XdmfSeries};
 use crate::deck::model::{Basis, Format};
 use crate::error::Result;
@@ -29,6 +29,8 @@ pub struct PointsSeries {
     basis: Basis,
     formats: Vec<Format>,
     lists: Vec<FrameList>,
+    /// Of the domains.
+    domain_lists: Vec<FrameList>,
     points: XdmfSeries,
     domains: Option<XdmfSeries>,
     /// Number of the present stage, from one; `None` in a deck without stages.
@@ -50,7 +52,13 @@ impl PointsSeries {
             fields: with_always(fields),
             basis,
             formats: formats.to_vec(),
-            lists: lists(formats).map(|kind| FrameList::new(directory, kind)).collect(),
+            lists: Kind::of(formats)
+                .map(|kind| FrameList::new(directory, "points", kind))
+                .collect(),
+            domain_lists: Kind::of(formats)
+                .filter(|_| has_domains)
+                .map(|kind| FrameList::new(directory, "domains", kind))
+                .collect(),
             points: XdmfSeries::new(&directory.file("points.xdmf")),
             domains: has_domains.then(|| XdmfSeries::new(&directory.file("domains.xdmf"))),
             stage: None,
@@ -69,9 +77,14 @@ impl PointsSeries {
         comm: &SimpleCommunicator,
     ) -> Result<Self> {
         let mut this = Self::create(directory, fields, formats, basis, dimension);
-        let resumed =
-            lists(formats).map(|kind| FrameList::resume(directory, kind, last_step, comm));
-        this.lists = resumed.collect::<Result<_>>()?;
+        let resumed = |frames| {
+            Kind::of(formats)
+                .map(move |kind| FrameList::resume(directory, frames, kind, last_step, comm))
+        };
+        this.lists = resumed("points").collect::<Result<_>>()?;
+        if this.domains.is_some() {
+            this.domain_lists = resumed("domains").collect::<Result<_>>()?;
+        }
         if !formats.contains(&Format::Xdmf) {
             return Ok(this);
         }
@@ -86,7 +99,7 @@ impl PointsSeries {
 
     /// [`XdmfSeries::cut`]
     pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
-        for list in &mut self.lists {
+        for list in self.lists.iter_mut().chain(&mut self.domain_lists) {
             list.cut(comm)?;
         }
         self.points.cut(comm)?;
@@ -156,14 +169,16 @@ impl PointsSeries {
             numbers(&file, "domain_corner_numbers", 1 << D, points.len())?;
         }
         if self.formats.contains(&Format::VtkHdf) {
-            as_vtkhdf(&file, &self.fields, points.len(), comm)?;
+            vtkhdf::add(&file, &self.group(points.len()), comm)?;
         }
         file.finish()?;
-        if self.formats.contains(&Format::Vtu) {
-            let path = self.directory.file(&format!("{FRAMES}{step:06}.vtu"));
-            vtu::write(&path, time, &self.fields, points, comm)?;
+        if let (true, Some(shape)) = (self.formats.contains(&Format::VtkHdf), shape) {
+            self.write_domains_as_vtkhdf((step, time), shape, points.len(), &name, comm)?;
         }
-        for list in &mut self.lists {
+        if self.formats.contains(&Format::Vtu) {
+            self.write_as_vtu((step, time), shape, points, comm)?;
+        }
+        for list in self.lists.iter_mut().chain(&mut self.domain_lists) {
             list.push(step, time, comm)?;
         }
         if !self.formats.contains(&Format::Xdmf) {
@@ -183,54 +198,106 @@ impl PointsSeries {
         }
         Ok(())
     }
-}
 
-fn lists(formats: &[Format]) -> impl Iterator<Item = Kind> + use<'_> {
-    formats.iter().filter_map(|format| match format {
-        Format::Xdmf => None,
-        Format::VtkHdf => Some(Kind::Series),
-        Format::Vtu => Some(Kind::Pvd),
-    })
-}
-
-/// Makes the file a VTKHDF one (version 1.0, unstructured grid): a group whose members are links to the
-/// datasets that are there, and what VTK wants beside them.
-fn as_vtkhdf(
-    file: &FileWriter,
-    fields: &[PointField],
-    count: usize,
-    comm: &SimpleCommunicator,
-) -> Result<()> {
-    file.arrange(|file| {
-        let group = file.create_group("VTKHDF")?;
-        group.new_attr::<i64>().shape(2).create("Version")?.as_writer().write_raw(&[1_i64, 0])?;
-        let kind = FixedAscii::<16>::from_ascii(b"UnstructuredGrid");
-        let kind = kind.map_err(|reason| hdf5::Error::from(reason.to_string()))?;
-        group.new_attr::<FixedAscii<16>>().create("Type")?.as_writer().write_scalar(&kind)?;
-        group.create_group("PointData")?;
-        Ok(())
-    })?;
-    let first = file.first_row(count);
-    let offsets: Vec<i64> = (0..usize::from(comm.rank() == 0))
-        .chain(first + 1..first + count + 1)
-        .map(|end| end as i64)
-        .collect();
-    file.write_rows("VTKHDF/Offsets", 1, &offsets)?;
-    let total = file.write_rows("VTKHDF/Types", 1, &vec![VERTEX; count])?;
-    for name in ["NumberOfPoints", "NumberOfCells", "NumberOfConnectivityIds"] {
-        let one = [total as i64];
-        let rows = if comm.rank() == 0 { &one[..] } else { &[] };
-        file.write_rows(&format!("VTKHDF/{name}"), 1, rows)?;
-    }
-    file.arrange(|file| {
-        file.link_hard("/position", "/VTKHDF/Points")?;
-        file.link_hard("/vertices", "/VTKHDF/Connectivity")?;
-        for field in fields {
-            let name = field.name();
-            file.link_hard(&format!("/{name}"), &format!("/VTKHDF/PointData/{name}"))?;
+    /// What a VTKHDF file of `count` points on this rank links.
+    fn group(&self, count: usize) -> Group<'_> {
+        Group {
+            source: Source::Here,
+            topology: Topology::Polyvertex,
+            points: count,
+            cells: count,
+            places: "position",
+            nodes: Nodes::Dataset("vertices"),
+            point_data: self.fields.iter().map(|field| field.name()).collect(),
+            cell_data: Vec::new(),
         }
-        Ok(())
-    })
+    }
+
+    /// `domains-000005.h5`: the domains of `count` points on this rank, whose data lie in the file `of`.
+    fn write_domains_as_vtkhdf(
+        &self,
+        (step, time): (usize, f64),
+        shape: Topology,
+        count: usize,
+        of: &str,
+        comm: &SimpleCommunicator,
+    ) -> Result<()> {
+        let path = self.directory.file(&format!("domains-{step:06}.h5"));
+        let file = FileWriter::create(&path, comm)?;
+        file.write_number("step", &(step as u64))?;
+        file.write_number("time", &time)?;
+        let points = self.group(count);
+        let group = Group {
+            source: Source::File(of),
+            topology: shape,
+            points: count * shape.nodes_per_element(),
+            places: "domain_corners",
+            nodes: Nodes::InOrder,
+            point_data: Vec::new(),
+            cell_data: points.point_data.clone(),
+            ..points
+        };
+        vtkhdf::add(&file, &group, comm)?;
+        file.finish()
+    }
+
+    /// `points-000005.vtu` and `domains-000005.vtu`
+    fn write_as_vtu<const D: usize>(
+        &self,
+        (step, time): (usize, f64),
+        shape: Option<Topology>,
+        points: &Points<D>,
+        comm: &SimpleCommunicator,
+    ) -> Result<()> {
+        let rank = comm.rank();
+        let arrays = || -> Vec<Array<'_>> {
+            let fields = self.fields.iter().filter(|field| **field != PointField::Position);
+            fields.map(|field| array_of(*field, points, rank)).collect()
+        };
+        let count = points.len();
+        let frame = Frame {
+            topology: Topology::Polyvertex,
+            points: count,
+            cells: count,
+            places: Box::new(|| {
+                let mut places = Vec::with_capacity(3 * count);
+                points.position.iter().for_each(|x| append_vector(x, &mut places));
+                places
+            }),
+            connectivity: None,
+            point_data: arrays(),
+            cell_data: Vec::new(),
+        };
+        let path = |begin: &str| self.directory.file(&format!("{begin}{step:06}.vtu"));
+        vtu::write(&path(FRAMES), time, frame, comm)?;
+        let Some(topology) = shape else { return Ok(()) };
+        let frame = Frame {
+            topology,
+            points: count << D,
+            cells: count,
+            places: Box::new(|| domains::corner_rows(points, self.basis)),
+            connectivity: None,
+            point_data: Vec::new(),
+            cell_data: arrays(),
+        };
+        vtu::write(&path("domains-"), time, frame, comm)
+    }
+}
+
+fn array_of<'a, const D: usize>(field: PointField, points: &'a Points<D>, rank: i32) -> Array<'a> {
+    let quantity = field.quantity();
+    let count = points.len();
+    if quantity == Quantity::Integer {
+        return Array::integers(field.name(), move || {
+            (0..count).filter_map(|p| field.integer(points, p, rank)).collect()
+        });
+    }
+    let array = Array::floats(field.name(), quantity.columns(), move || {
+        let mut values = Vec::with_capacity(count * quantity.columns());
+        (0..count).for_each(|p| field.append(points, p, &mut values));
+        values
+    });
+    array.with_components(quantity.component_names())
 }
 
 fn with_always(fields: &[PointField]) -> Vec<PointField> {

@@ -1,4 +1,4 @@
-//! Lines for steps: where the run is, how the solver did, how long it will still take.
+//! Lines for steps: where the run is, how the solver did, how fast it is, how long it will still take.
 
 use super::log::Log;
 use super::report::{duration, fixed_width};
@@ -54,6 +54,8 @@ pub struct Progress {
     started: Option<(f64, f64)>,
     last_line: Option<f64>,
     last_change: f64,
+    /// Step and s of the last line anywhere.
+    told: Option<(usize, f64)>,
     headed: bool,
 }
 
@@ -66,6 +68,7 @@ impl Progress {
             started: Some((share, elapsed)),
             last_line: None,
             last_change: 0.0,
+            told: None,
             headed: false,
         }
     }
@@ -84,11 +87,12 @@ impl Progress {
         if !std::mem::replace(&mut self.headed, true) {
             log.say(&heading(report));
         }
-        let line = line(report, self.left(report));
+        let line = line(report, self.rate(report), self.left(report));
         let due = self.due(report);
         if due {
             log.note(&line);
             self.last_due = Some(report.elapsed);
+            self.told = Some((report.step, report.elapsed));
         }
         let quiet_for = report.elapsed - self.last_line.unwrap_or(f64::NEG_INFINITY);
         if due && (!log.on_terminal() || quiet_for >= LINE_EVERY || report.last) {
@@ -99,6 +103,14 @@ impl Progress {
             log.show_briefly(&line);
             self.last_change = report.elapsed;
         }
+    }
+
+    /// Steps a second since the last line of the log.
+    fn rate(&self, report: &StepReport) -> Option<f64> {
+        let start = self.started.map_or(0.0, |(_, elapsed)| elapsed);
+        let (step, elapsed) = self.told.unwrap_or((report.step.saturating_sub(1), start));
+        let rate = report.step.saturating_sub(step) as f64 / (report.elapsed - elapsed);
+        (rate.is_finite() && rate > 0.0).then_some(rate)
     }
 
     /// Seconds to go, if the rest is like the part done so far.
@@ -113,10 +125,20 @@ impl Progress {
 fn heading(report: &StepReport) -> String {
     let place = if report.time.is_some() { "   time [s]" } else { "       load" };
     let solver = if report.newton.is_some() { "  newton   residual  linear" } else { "" };
-    format!("\n{:>13}{place}{solver}   elapsed      left", "step")
+    format!("\n{:>13}{place}{solver}   steps/s   elapsed      left", "step")
 }
 
-fn line(report: &StepReport, left: Option<f64>) -> String {
+/// Three digits of a rate.
+fn three_digits(rate: f64) -> String {
+    match rate {
+        rate if rate >= 99.95 => format!("{rate:.0}"),
+        rate if rate >= 9.995 => format!("{rate:.1}"),
+        rate if rate >= 0.01 => format!("{rate:.2}"),
+        rate => format!("{rate:.1e}"),
+    }
+}
+
+fn line(report: &StepReport, rate: Option<f64>, left: Option<f64>) -> String {
     let step = match report.steps {
         Some(steps) => format!("{}/{steps}", report.step),
         None => report.step.to_string(),
@@ -134,6 +156,7 @@ fn line(report: &StepReport, left: Option<f64>) -> String {
             newton.linear_iterations
         );
     }
+    line += &format!("{:>10}", rate.map_or("-".into(), three_digits));
     line += &format!("{:>10}{:>10}", duration(report.elapsed), left.map_or("-".into(), duration));
     match report.newton.map_or(0, |newton| newton.cuts) {
         0 => {}
@@ -163,15 +186,32 @@ mod tests {
         let left = Progress::new(Interval::Steps(1), 0.0, 2.0).left(&report);
         assert_eq!(left, Some(90.0), "10 s for a tenth");
         assert_eq!(
-            format!("{}\n{}", heading(&report), line(&report, left)),
-            "\n         step       load  newton   residual  linear   elapsed      left\n         \
-             5/50     0.1000       4   3.21e-10      57    12.0 s     1m30s  (cut 2 times)"
+            format!("{}\n{}", heading(&report), line(&report, Some(0.4567), left)),
+            "\n         step       load  newton   residual  linear   steps/s   elapsed      left\n         \
+             5/50     0.1000       4   3.21e-10      57      0.46    12.0 s     1m30s  (cut 2 times)"
         );
         let report = StepReport { time: Some(0.0125), newton: None, steps: None, ..report };
         assert_eq!(
-            format!("{}\n{}", heading(&report), line(&report, None)),
-            "\n         step   time [s]   elapsed      left\n            5  1.250e-02    12.0 s         -"
+            format!("{}\n{}", heading(&report), line(&report, None, None)),
+            "\n         step   time [s]   steps/s   elapsed      left\n            \
+             5  1.250e-02         -    12.0 s         -"
         );
+        assert_eq!(
+            [1234.4, 99.9, 9.99, 0.5, 0.00123].map(three_digits),
+            ["1234", "99.9", "9.99", "0.50", "1.2e-3"]
+        );
+    }
+
+    #[test]
+    fn the_rate_is_that_since_the_last_line() {
+        let mut progress = Progress::new(Interval::Steps(1), 0.0, 2.0);
+        let report = StepReport { step: 11, elapsed: 2.25, ..Default::default() };
+        assert_eq!(progress.rate(&report), Some(4.0), "one step since the start");
+        progress.told = Some((11, 2.25));
+        let report = StepReport { step: 21, elapsed: 3.25, ..Default::default() };
+        assert_eq!(progress.rate(&report), Some(10.0));
+        progress.told = Some((21, 3.25));
+        assert_eq!(progress.rate(&report), None, "no time has passed");
     }
 
     #[test]

@@ -1,0 +1,147 @@
+//! Typical mistakes of people who begin, in the templates that they begin with: each leads to the right exit
+//! code, to the key, and to words of cause and cure.
+
+mod common;
+
+use common::run::Run;
+use mpm_par::deck::templates::template_of;
+
+/// Template; what is replaced in it; by what; exit code of `--check`; words that are said.
+type Mistake = (&'static str, &'static str, &'static str, i32, &'static [&'static str]);
+
+const MISTAKES: [Mistake; 18] = [
+    // Slips of the pen.
+    (
+        "beam",
+        "young = 12e6",
+        "yuong = 12e6",
+        2,
+        &["material.rubber", "yuong", "did you mean \"young\""],
+    ),
+    ("slope", "[[load]]", "[[laod]]", 2, &["laod", "did you mean \"load\""]),
+    ("slope", "material = \"clay\"", "material = \"cley\"", 2, &["body.0.material", "\"clay\""]),
+    (
+        "slope",
+        "\"displacement\", \"stress\"",
+        "\"displacment\"",
+        2,
+        &["output.fields", "\"displacement\""],
+    ),
+    (
+        "slope",
+        "size = [35.0, 12.0]",
+        "size = [35.0 12.0]",
+        2,
+        &["slope.toml:20:", "not valid TOML"],
+    ),
+    // Units.
+    ("slope", "young = 10e6", "young = 10e3", 0, &["rho g H / E", "units of density (kg/m3)"]),
+    ("slope", "density = 1835.0", "density = 1.835", 0, &["1.835 kg/m3", "soil has 1500 to 2200"]),
+    ("column-collapse", "friction = 31.0", "friction = 0.54", 0, &["degrees", "radians"]),
+    // Geometry.
+    (
+        "slope",
+        "size = [35.0, 12.0]",
+        "size = [35.0, 9.0]",
+        2,
+        &["body \"slope\"", "outside the grid", "enlarge"],
+    ),
+    ("slope", "h = 1.0", "h = 2.3", 2, &["grid.size", "whole cells", "nearest: 34.5 or 36.8 m"]),
+    (
+        "beam",
+        "[10, 9.499], [10, 9.501]",
+        "[12, 9.5]",
+        2,
+        &["load.0.point.nearest", "away from the nearest point"],
+    ),
+    (
+        "footing",
+        "min = [0, 4], max = [1, 4]",
+        "min = [0, 4.1], max = [1, 4.2]",
+        2,
+        &["boundary.3.where", "no"],
+    ),
+    // Physics.
+    (
+        "slope",
+        "where = { side = \"bottom\" }\nfix = [\"x\", \"y\"]",
+        "where = { side = \"bottom\" }\nfix = [\"x\"]",
+        2,
+        &["no [[boundary]] holds y", "fix = [\"y\"]"],
+    ),
+    ("footing", "poisson = 0.49", "poisson = 0.5", 2, &["material.clay.poisson", "< 0.5"]),
+    ("column-collapse", "cfl = 0.4", "steps = 100", 0, &["stability limit", "analysis.cfl = 0.5"]),
+    (
+        "column-collapse",
+        "duration = 0.6",
+        "",
+        2,
+        &["analysis.duration", "type = \"explicit\" needs it"],
+    ),
+    (
+        "collision",
+        "mass = \"lumped\"",
+        "mass = \"lumped\"\nlocking = \"fbar\"",
+        2,
+        &["method.locking", "\"f-bar\""],
+    ),
+    ("footing", "locking = \"f-bar\"", "locking = \"none\"", 0, &["locking", "f-bar"]),
+];
+
+#[test]
+fn typical_mistakes_are_explained() {
+    for (name, from, to, code, words) in MISTAKES {
+        let text = template_of(name).expect("a template").text;
+        assert!(text.contains(from), "{name}: {from}");
+        let outcome = Run::text(&text.replacen(from, to, 1)).word("--check").attempt();
+        let said = format!("{}{}", outcome.stdout, outcome.stderr)
+            .replace("deck.toml", &format!("{name}.toml"));
+        assert_eq!(outcome.code, code, "{to}: {said}");
+        for word in words {
+            assert!(said.contains(word), "{to}: not said: {word}\n{said}");
+        }
+        assert_eq!(outcome.files(), ["deck.toml"], "{to}: something was written");
+    }
+}
+
+/// Mistakes on the command line.
+#[test]
+fn mistakes_of_the_command_line_are_explained() {
+    let beam = || Run::text(template_of("beam").expect("a template").text);
+    for (run, code, words) in [
+        (
+            beam().word("--restart").word("last"),
+            3,
+            &["holds no checkpoint", "output.checkpoint"][..],
+        ),
+        (beam().set("grid.hh=0.5"), 2, &["grid.hh", "did you mean \"h\""]),
+        (beam().word("-qs_ksp_tpye").word("cg"), 2, &["-qs_ksp_tpye", "did you mean -qs_ksp_type"]),
+        (beam().word("--chekc"), 2, &["--chekc", "--check"]),
+    ] {
+        let outcome = run.attempt();
+        assert_eq!(outcome.code, code, "{}", outcome.stderr);
+        for word in words {
+            assert!(outcome.stderr.contains(word), "not said: {word}\n{}", outcome.stderr);
+        }
+    }
+    let done = beam().set("analysis.steps=2").set("load.0.point.force=[0, -1e3]").attempt();
+    assert_eq!(done.code, 0, "{}", done.stderr);
+    let again = beam().attempt_in(done.folder);
+    assert_eq!(again.code, 2, "{}", again.stderr);
+    for word in ["already holds results", "--force", "--out DIR", "--restart last"] {
+        assert!(again.stderr.contains(word), "{}", again.stderr);
+    }
+}
+
+/// A load that is too large ends the run, and the message says what to try.
+#[test]
+fn a_load_that_is_too_large_is_explained() {
+    let text = template_of("beam").expect("a template").text;
+    let run = Run::text(&text.replace("force = [0, -100e3]", "force = [0, -100e7]"));
+    let outcome = run.attempt();
+    assert_eq!(outcome.code, 1, "{}", outcome.stderr);
+    for word in ["step 1", "try:", "analysis.on_failure = \"cut\""] {
+        assert!(outcome.stderr.contains(word), "not said: {word}\n{}", outcome.stderr);
+    }
+    assert!(outcome.results().text("summary.json").contains("\"stopped\""));
+}
