@@ -337,3 +337,14 @@ fn what_fails_in_petscs_end_does_not_fail_the_run() {
         assert_eq!(left::summary(&outcome.folder.path().join("out"))["status"], "completed");
     }
 }
+
+/// The banner tells that MUMPS is missing where PETSc has none, and only there.
+#[test]
+fn the_banner_tells_of_mumps_what_petsc_has() {
+    let plain = block().attempt();
+    assert_eq!(plain.code, 0, "{}", plain.stderr);
+    let words = "-qs_ksp_type preonly -qs_pc_type lu -qs_pc_factor_mat_solver_type mumps";
+    let asked = with(words).attempt();
+    let missing = plain.stdout.contains("built without MUMPS");
+    assert_eq!(asked.code == 0, !missing, "{}\n{}", plain.stdout, asked.stderr);
+}

@@ -14,6 +14,8 @@ pub const OWN: &str = "petsc";
 /// [`MUMPS`] or [`OWN`]; call while PETSc runs.
 pub fn package() -> &'static str {
     let (mut package, mut kind) = (sys::PETSC_FALSE, sys::PETSC_FALSE);
+    // Before the first matrix PETSc does not know of MUMPS yet.
+    let ready = petsc!(MatInitializePackage());
     let found = petsc!(MatSolverTypeGet(
         c"mumps".as_ptr(),
         sys::MATSEQAIJ.as_ptr().cast(),
@@ -23,7 +25,7 @@ pub fn package() -> &'static str {
         null_mut()
     ));
     // A question that fails leaves MUMPS: the solver then says what is wrong with it.
-    if found.is_ok() && kind == sys::PETSC_FALSE { OWN } else { MUMPS }
+    if ready.is_ok() && found.is_ok() && kind == sys::PETSC_FALSE { OWN } else { MUMPS }
 }
 
 /// What a user should know of it: nothing where MUMPS is there.
