@@ -8,6 +8,7 @@ use std::ffi::c_void;
     non_camel_case_types,
     non_snake_case,
     dead_code,
+    unnecessary_transmutes,
     unused_imports,
     clippy::all
 )]
