@@ -23,16 +23,17 @@ cp "$package" "$root/root/mpm-par.deb"
 cat >"$root/root/try.sh" <<'SCRIPT'
 set -eu
 mount -t proc proc /proc
+mount -t sysfs sysfs /sys
 mount -t tmpfs tmpfs /dev/shm
 apt-get update -q >/dev/null
 DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /root/mpm-par.deb >/root/apt.log
 useradd --create-home user
-su user -c 'set -eu; cd
+su user -s /bin/bash -c 'set -euo pipefail; cd
   mpm-par --version
   mpm-par --new slope
   mpm-par slope.toml --check >/dev/null
   mpirun --oversubscribe -n 2 mpm-par slope.toml --set analysis.steps=2 | tail -n 3
-  mpirun --oversubscribe -n 2 mpm-par /usr/share/doc/mpm-par/inputs/beam.toml --out out/beam --set analysis.steps=2 | tail -n 3
+  mpirun --oversubscribe -n 2 mpm-par /usr/share/doc/mpm-par/inputs/beam.toml --out out/beam | tail -n 3
   mpm-par report out/slope'
 apt-get remove -y -q mpm-par >/dev/null
 ! command -v mpm-par
