@@ -21,7 +21,7 @@ trial() {
   for test in $tests; do arguments+=(--test "$test"); done
   cargo build --target-dir "$target"
   # The first lines say which PETSc it is.
-  sh jobs/mpirun.sh 2 "$target/debug/mpm-par" inputs/beam.toml --set analysis.steps=5 \
+  sh jobs/mpirun.sh 2 "$target/debug/mpm-par" inputs/beam.toml \
     --out "$place/out" --force
   cargo test --no-fail-fast --target-dir "$target" "${arguments[@]}"
 }
