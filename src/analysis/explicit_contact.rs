@@ -11,7 +11,7 @@ use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::{FreeState, HistoryRow};
 use crate::parallel::World;
 use crate::points::Points;
-use crate::record::contact::ContactTotals;
+use crate::record::contact::{ContactTotals, Met};
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
@@ -35,7 +35,7 @@ impl<const D: usize> ContactSteps<D> {
     pub fn new(model: &Model<D>) -> Self {
         let contacts = &model.contacts;
         ContactSteps {
-            totals: ContactTotals::new(contacts.pairs.len()),
+            totals: ContactTotals::new(model.deck.contacts.len()),
             free: contacts.rigids.iter().map(|rigid| rigid.free.clone()).collect(),
         }
     }
@@ -101,6 +101,11 @@ impl<const D: usize> ContactSteps<D> {
         let end = When { load_factor: end.factor, time: end.time };
         let driven = model.contacts.poses(end).into_iter();
         driven.zip(&self.free).map(|(pose, body)| body.as_ref().map_or(pose, |b| b.pose)).collect()
+    }
+
+    /// Books what pairs of bodies have exchanged in a step into its row. Collective.
+    pub fn book_bodies(&mut self, world: &World, met: &[Met], row: &mut HistoryRow) {
+        self.totals.book_bodies(world, met, row);
     }
 
     /// Books what a step leaves into its row. Collective.

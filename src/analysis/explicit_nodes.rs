@@ -302,7 +302,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
     }
 
     /// Lets light nodes move along with the others. Collective.
-    fn carry(&self, step: StepPoints<'_, D>, nodal: &mut [f64]) -> Result<()> {
+    pub fn carry(&self, step: StepPoints<'_, D>, nodal: &mut [f64]) -> Result<()> {
         match &self.light {
             Some(light) => light.carry(self.world, self.mesh, step, nodal, &self.conditions.fixed),
             None => Ok(()),

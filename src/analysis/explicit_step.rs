@@ -11,6 +11,7 @@ use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::following::Following;
 use crate::system::terms::stress::StepPoints;
 
+use super::explicit_bodies::{AtNodes, meet};
 use super::explicit_contact::ContactSteps;
 use super::explicit_nodes::{Forces, Motion, Nodes};
 use super::external::add;
@@ -90,7 +91,7 @@ pub(crate) fn advance<const D: usize>(
         StressUpdate::Usf => Some(nodes.deform_first(carrier, &velocity, points, before)?),
         StressUpdate::Usl | StressUpdate::Musl => None,
     };
-    let Forces { pushed, mut acceleration } = match (forces, &first) {
+    let Forces { mut pushed, mut acceleration } = match (forces, &first) {
         (Some(forces), _) => forces,
         (None, first) => {
             let none = Deformation::default();
@@ -107,6 +108,14 @@ pub(crate) fn advance<const D: usize>(
     };
     for (a, d) in acceleration.iter_mut().zip(&slowed) {
         *a -= d;
+    }
+    let mut met = Vec::new();
+    if let (false, GridMass::Lumped(mass)) = (model.contacts.body_pairs.is_empty(), &mass) {
+        let at = AtNodes { mass, fixed: &conditions.fixed, velocity: &velocity, dt };
+        met = clock.time(Phase::Assemble, || {
+            meet(world, model, &mesh, points, &at, &mut acceleration, &mut pushed)
+        })?;
+        nodes.carry(mesh.step_points(points, &model.materials), &mut acceleration)?;
     }
     for (v, a) in velocity.iter_mut().zip(&acceleration) {
         *v += dt * a;
@@ -194,6 +203,9 @@ pub(crate) fn advance<const D: usize>(
         ),
         ..grid_side(world, &mesh, points)
     };
+    if !met.is_empty() {
+        contact.book_bodies(world, &met, &mut row);
+    }
     if let Some(touching) = &touching {
         contact.book(world, touching, &mut row);
     }

@@ -52,7 +52,7 @@ impl<const D: usize> Implicit<D> {
             stepping: Stepping::new(&run.model.deck.stages, dynamic, policy, smallest),
             trials: Trials::default(),
             totals: Totals::default(),
-            contact: ContactTotals::new(run.model.contacts.pairs.len()),
+            contact: ContactTotals::new(run.model.deck.contacts.len()),
             dynamics: dynamic.then(|| Dynamics::new(run)),
         }
     }

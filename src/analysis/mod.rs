@@ -25,6 +25,7 @@ mod damping;
 pub(crate) mod element_test;
 pub mod equilibrium;
 pub(crate) mod explicit;
+mod explicit_bodies;
 pub(crate) mod explicit_contact;
 mod explicit_nodes;
 pub(crate) mod explicit_step;

@@ -17,9 +17,9 @@ pub struct DomainStep<'a, const D: usize> {
     pub increments: &'a [[[f64; D]; D]],
     /// Displacement of each point, m.
     pub moved: &'a [[f64; D]],
-    /// Displacement of a node, m; zero where no equation lives. It is asked only for nodes in the
-    /// point's own row of [`Basis::map_points`].
-    pub nodal: &'a dyn Fn(usize) -> [f64; D],
+    /// Displacement, as a point sees it, of a node, m; zero where no equation lives. It is asked only
+    /// for nodes in the point's own row of [`Basis::map_points`].
+    pub nodal: &'a dyn Fn(usize, usize) -> [f64; D],
     /// The points are rings: axisymmetry.
     pub rings: bool,
 }
@@ -359,7 +359,7 @@ impl<const D: usize> Basis<D> for Cpdi2 {
         p: usize,
         hint: &mut Option<usize>,
     ) -> Result<Option<[[f64; D]; 8]>> {
-        cpdi2::moved_corners(step.grids, points, p, hint, &step.nodal).map(Some)
+        cpdi2::moved_corners(step.grids, points, p, hint, &|node| (step.nodal)(p, node)).map(Some)
     }
 
     fn update_domains(

@@ -40,7 +40,7 @@ fn update_domains<const D: usize>(
     rule: DomainUpdate,
     points: &mut Points<D>,
     increments: &[Matrix3<f64>],
-    nodal: &dyn Fn(usize) -> [f64; D],
+    nodal: &dyn Fn(usize, usize) -> [f64; D],
 ) -> Result<usize> {
     let less_unit = |f: &Matrix3<f64>| -> [[f64; D]; D] {
         let f = f - Matrix3::identity();
@@ -76,7 +76,7 @@ fn step<const D: usize>(
         std::array::from_fn(|i| (0..D).map(|j| increment[(i, j)] * x[j]).sum::<f64>() - x[i])
     };
     points.deformation_gradient[0] = increment * points.deformation_gradient[0];
-    let displacement = |node: usize| {
+    let displacement = |_: usize, node: usize| {
         assert!(row.contains(&node), "node {node} is not in the point's row");
         motion(&grid.node_position(node))
     };
@@ -278,7 +278,8 @@ fn corners_beyond_the_grid_move_with_its_edge() {
     let mut points = points([-3.95, 0.3]);
     let grid = grid::<2>();
     points.deformation_gradient[0][(0, 0)] = s;
-    let displacement = |node: usize| [(s - 1.0) * (grid.node_position(node)[0] + 4.0), 0.0];
+    let displacement =
+        |_: usize, node: usize| [(s - 1.0) * (grid.node_position(node)[0] + 4.0), 0.0];
     let (basis, rule) = (Basis::Gimp, DomainUpdate::Corners);
     update_domains(&grid, basis, rule, &mut points, &[Matrix3::identity()], &displacement)
         .expect("valid");

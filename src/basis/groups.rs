@@ -24,7 +24,24 @@ pub struct Groups {
 impl Groups {
     /// Groups the rows of `influences`.
     pub fn new<const D: usize>(influences: &Influences<D>) -> Self {
-        let count = influences.len();
+        Self::of_rows(&influences.offsets, &influences.nodes)
+    }
+
+    /// Groups rows whose nodes are others than those of the grid: `node` of a point and a node of the
+    /// grid, ascending with it.
+    pub fn renamed<const D: usize>(
+        influences: &Influences<D>,
+        node: impl Fn(usize, usize) -> usize,
+    ) -> Self {
+        let rows = 0..influences.len();
+        let of = |p: usize| influences.nodes[influences.row(p)].iter().map(move |&n| (p, n));
+        let nodes: Vec<usize> = rows.flat_map(of).map(|(p, n)| node(p, n)).collect();
+        Self::of_rows(&influences.offsets, &nodes)
+    }
+
+    /// Row p is `nodes[offsets[p]..offsets[p + 1]]`.
+    fn of_rows(offsets: &[usize], nodes: &[usize]) -> Self {
+        let count = offsets.len().saturating_sub(1);
         let mut groups = Groups { node_offsets: vec![0], ..Groups::default() };
         groups.group_of_point.reserve(count);
         // Few rows share their first node; those that do are chained.
@@ -33,7 +50,7 @@ impl Groups {
         let mut next_with: Vec<Option<usize>> = Vec::new();
         let mut sizes: Vec<usize> = Vec::new();
         for p in 0..count {
-            let row = &influences.nodes[influences.row(p)];
+            let row = &nodes[offsets[p]..offsets[p + 1]];
             // Sorted points mostly repeat their predecessor's row.
             let before = groups.group_of_point.last().copied();
             let group = match before.filter(|&g| same(groups.nodes(g), row)) {

@@ -4,6 +4,7 @@ use super::ball::Ball;
 use super::capsule::Capsule;
 use super::cone::Cone;
 use super::cuboid::Cuboid;
+use super::fields::Fields;
 use super::free::FreeBody;
 use super::half_space::HalfSpace;
 use super::law::{Friction, Law};
@@ -13,7 +14,7 @@ use super::pose::Pose;
 use super::surface::{Surface, length};
 use super::triangles::Triangles;
 use crate::deck::Deck;
-use crate::deck::model::{self, Basis, RigidShape, Symmetry};
+use crate::deck::model::{self, Basis, Partner, RigidShape, Symmetry};
 use crate::error::{Error, Result};
 
 /// A rigid body.
@@ -40,6 +41,8 @@ impl<const D: usize> Rigid<D> {
 #[derive(Debug, Clone)]
 pub struct Pair {
     pub name: String,
+    /// Index into the deck's contacts.
+    pub index: usize,
     /// Index into [`Contacts::rigids`].
     pub rigid: usize,
     /// Index into the deck's bodies.
@@ -47,33 +50,60 @@ pub struct Pair {
     pub law: Law,
 }
 
+/// Two bodies that touch.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BodyPair {
+    /// Index into the deck's contacts.
+    pub index: usize,
+    /// Indices into the deck's bodies.
+    pub bodies: [usize; 2],
+    pub friction: Friction,
+}
+
 /// All of a deck.
 #[derive(Debug, Default)]
 pub struct Contacts<const D: usize> {
     pub rigids: Vec<Rigid<D>>,
     pub pairs: Vec<Pair>,
+    pub body_pairs: Vec<BodyPair>,
+    /// Which bodies move in a velocity field of their own.
+    pub fields: Fields,
     /// Points are sections of rings: axisymmetry.
     pub rings: bool,
 }
 
 impl<const D: usize> Contacts<D> {
-    /// `stiffness`: mean stiffness of each body, Pa; `cell`: size of the grid's cells, m.
-    pub fn of_deck(deck: &Deck, stiffness: &[f64], cell: f64) -> Result<Self> {
+    /// `stiffness`: mean stiffness of each body, Pa; `cell`: size of the grid's cells, m; `nodes`: how
+    /// many the grid has.
+    pub fn of_deck(deck: &Deck, stiffness: &[f64], (cell, nodes): (f64, usize)) -> Result<Self> {
         let made = |(index, one)| rigid(deck, index, one);
         let rigids = deck.rigids.iter().enumerate().map(made).collect::<Result<_>>()?;
-        let pair = |contact: &model::Contact| Pair {
-            name: contact.name.clone(),
-            rigid: contact.rigid,
-            body: contact.body,
-            law: Law {
-                penalty: contact.penalty * stiffness[contact.body] / cell,
-                friction: friction(contact),
-            },
-        };
+        let (mut pairs, mut body_pairs) = (Vec::new(), Vec::new());
+        for (index, contact) in deck.contacts.iter().enumerate() {
+            let friction = friction(contact);
+            match contact.partner {
+                Partner::Rigid(rigid) => pairs.push(Pair {
+                    name: contact.name.clone(),
+                    index,
+                    rigid,
+                    body: contact.body,
+                    law: Law {
+                        penalty: contact.penalty * stiffness[contact.body] / cell,
+                        friction,
+                    },
+                }),
+                Partner::Body(other) => {
+                    body_pairs.push(BodyPair { index, bodies: [contact.body, other], friction });
+                }
+            }
+        }
+        let touching = body_pairs.iter().flat_map(|pair| pair.bodies);
+        let fields = Fields::of_bodies(deck.bodies.len(), touching, nodes);
         let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
-        Ok(Contacts { rigids, pairs: deck.contacts.iter().map(pair).collect(), rings })
+        Ok(Contacts { rigids, pairs, body_pairs, fields, rings })
     }
 
+    /// Whether no body touches a rigid one.
     pub fn is_empty(&self) -> bool {
         self.pairs.is_empty()
     }

@@ -18,7 +18,7 @@ pub struct DomainCorners<const D: usize> {
     pub positions: [[f64; D]; 8],
     pub count: usize,
     /// Mean edges, m.
-    edges: [[f64; D]; D],
+    pub edges: [[f64; D]; D],
     /// Radius of the point, m, where the domains are sections of rings.
     radius: Option<f64>,
 }

@@ -1,5 +1,6 @@
 //! Contact of bodies with rigid surfaces, by a penalty (formulations.md B.5; Bird et al. 2024,
-//! arXiv 2412.01565).
+//! arXiv 2412.01565), and with each other, by impulses at nodes (Bardenhagen et al. 2001; Nairn et al.
+//! 2020).
 //!
 //! | deck key | type | file |
 //! |---|---|---|
@@ -19,6 +20,9 @@
 //! | pressure and friction | [`Law`](law::Law) | `law.rs` |
 //! | corners of the points' domains | [`DomainCorners`](corner::DomainCorners) | `corner.rs` |
 //! | corners at the start of a run | [`Corner`](start::Corner) | `start.rs` |
+//! | velocity fields of bodies that touch each other | [`Fields`](fields::Fields) | `fields.rs` |
+//! | the plane between two bodies | [`separate`](separator::separate) | `separator.rs` |
+//! | impulses between two fields at a node | [`Meeting`](nodal::Meeting) | `nodal.rs` |
 //! | the rigid bodies and contacts of a deck | [`Contacts`] | `contacts.rs` |
 //!
 //! A new surface is one file that implements [`Surface`] and one line of `contacts.rs`. The forces
@@ -31,18 +35,21 @@ pub(crate) mod contacts;
 pub(crate) mod corner;
 pub(crate) mod cuboid;
 pub(crate) mod facets;
+pub(crate) mod fields;
 pub(crate) mod free;
 pub(crate) mod half_space;
 pub(crate) mod law;
 pub(crate) mod motion;
+pub(crate) mod nodal;
 pub(crate) mod outline;
 pub(crate) mod pose;
+pub(crate) mod separator;
 pub(crate) mod solid;
 pub(crate) mod start;
 pub(crate) mod surface;
 pub(crate) mod triangles;
 
-pub use contacts::{Contacts, Pair};
+pub use contacts::{BodyPair, Contacts, Pair};
 pub use surface::Near;
 
 #[cfg(test)]

@@ -27,11 +27,40 @@ pub fn surfaces<const D: usize>(model: &Model<D>, poses: &[Pose<D>]) -> RigidFra
     RigidFrame { corners: all.corners, facets: all.facets, body }
 }
 
+/// What two bodies exchange in a step, this rank's share.
+#[derive(Debug, Clone, Default)]
+pub struct Met {
+    /// Index into the deck's contacts.
+    pub index: usize,
+    /// On the second body, N.
+    pub force: [f64; 3],
+    /// m2 (m in 2D)
+    pub area: f64,
+    /// Σ A times the slip of the step, m3 (m2 in 2D).
+    pub slid: f64,
+    /// Of the deepest overlap, m.
+    pub depth: f64,
+    /// Dissipated by friction in the step, J.
+    pub friction: f64,
+    /// Lost along the normals, where bodies meet, J.
+    pub impact: f64,
+    /// The node counted last.
+    pub last: Option<usize>,
+}
+
+impl Met {
+    pub fn of(index: usize) -> Self {
+        Met { index, ..Met::default() }
+    }
+}
+
 /// Sums of a run so far.
 #[derive(Debug, Default)]
 pub struct ContactTotals {
     /// J
     dissipation: f64,
+    /// Lost by bodies that meet, J.
+    impact: f64,
     /// Mean slip of each contact, m.
     slip: Vec<f64>,
 }
@@ -39,7 +68,7 @@ pub struct ContactTotals {
 impl ContactTotals {
     /// Of so many contacts.
     pub fn new(contacts: usize) -> Self {
-        ContactTotals { dissipation: 0.0, slip: vec![0.0; contacts] }
+        ContactTotals { slip: vec![0.0; contacts], ..ContactTotals::default() }
     }
 
     pub fn save(&self, state: &mut RunState) {
@@ -47,6 +76,7 @@ impl ContactTotals {
             return;
         }
         state.set("contact.dissipation", self.dissipation);
+        state.set("contact.impact", self.impact);
         for (k, slip) in self.slip.iter().enumerate() {
             state.set(&format!("contact.slip.{k}"), *slip);
         }
@@ -57,6 +87,8 @@ impl ContactTotals {
             return Ok(());
         }
         self.dissipation = state.number("contact.dissipation")?;
+        // Not known to the first checkpoints with contact.
+        self.impact = state.number("contact.impact").unwrap_or(0.0);
         for (k, slip) in self.slip.iter_mut().enumerate() {
             *slip = state.number(&format!("contact.slip.{k}"))?;
         }
@@ -88,15 +120,41 @@ impl ContactTotals {
         });
         row.rigids = exerted.collect();
         self.dissipation += sums[1];
-        (row.energy_contact, row.dissipation_friction) = (sums[0], self.dissipation);
-        let states = pairs.chunks_exact(2).zip(&mut self.slip).zip(depths);
-        row.contacts = states
-            .map(|((sums, slip), gap_max)| {
-                if sums[0] > 0.0 {
-                    *slip += sums[1] / sums[0];
-                }
-                ContactState { area: sums[0], slip: *slip, gap_max }
-            })
-            .collect();
+        row.energy_contact = sums[0];
+        let states = finished.pairs.iter().zip(pairs.chunks_exact(2)).zip(depths);
+        for ((pair, sums), gap_max) in states {
+            self.book_state(pair.index, [sums[0], sums[1], gap_max], [0.0; 3], row);
+        }
+    }
+
+    /// The same of pairs of bodies. Collective.
+    pub fn book_bodies(&mut self, world: &World, met: &[Met], row: &mut HistoryRow) {
+        let of_one = |one: &Met| {
+            let [x, y, z] = one.force;
+            [x, y, z, one.area, one.slid, one.friction, one.impact]
+        };
+        let sums = world.sum_slice(&met.iter().flat_map(of_one).collect::<Vec<f64>>());
+        let depths = world.max_slice(&met.iter().map(|one| one.depth).collect::<Vec<f64>>());
+        for ((one, sums), gap_max) in met.iter().zip(sums.chunks_exact(7)).zip(depths) {
+            self.dissipation += sums[5];
+            self.impact += sums[6];
+            let force = [sums[0], sums[1], sums[2]];
+            self.book_state(one.index, [sums[3], sums[4], gap_max], force, row);
+        }
+    }
+
+    fn book_state(
+        &mut self,
+        index: usize,
+        [area, slid, gap_max]: [f64; 3],
+        force: [f64; 3],
+        row: &mut HistoryRow,
+    ) {
+        row.contacts.resize(self.slip.len(), ContactState::default());
+        if area > 0.0 {
+            self.slip[index] += slid / area;
+        }
+        row.contacts[index] = ContactState { area, slip: self.slip[index], gap_max, force };
+        (row.dissipation_friction, row.dissipation_impact) = (self.dissipation, self.impact);
     }
 }

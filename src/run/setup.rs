@@ -184,7 +184,8 @@ fn model_of<const D: usize>(
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
     let loads = loads::of_deck(&deck.loads, found, grid.cell_size())?;
     let supports = surfaces::supports(world, &deck, points, grid.cell_size())?;
-    let contacts = Arc::new(Contacts::of_deck(&deck, &stiffness, grid.cell_size())?);
+    let contacts =
+        Arc::new(Contacts::of_deck(&deck, &stiffness, (grid.cell_size(), grid.node_count()))?);
     let symmetric = symmetric
         && contacts.symmetric()
         && loads.iter().all(|load| load.symmetric())

@@ -238,7 +238,7 @@ fn cells_of<const D: usize>(
             nodes.clear();
             grid.cell_nodes(cell, &mut nodes);
             for &node in &nodes {
-                if let Some(local) = numbering.local(node) {
+                if let Some(local) = numbering.local_of(body, node) {
                     marks[local] = 1.0;
                 }
             }

@@ -20,6 +20,7 @@
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 //! | `supports.rs` | surfaces held by a penalty, wherever they lie on the grid |
 //! | `face_points.rs` | the cells of points on faces, where the mass decides |
+//! | `shared_nodes.rs` | where bodies in velocity fields of their own meet |
 //! | `terms/` | contributions to the equations |
 
 pub(crate) mod border;
@@ -36,6 +37,7 @@ pub mod pattern;
 pub mod plain;
 pub(crate) mod populated;
 pub mod scatter;
+pub mod shared_nodes;
 pub mod step_system;
 pub(crate) mod support_columns;
 pub(crate) mod supports;

@@ -1,6 +1,7 @@
 //! Equations over active nodes: those of populated cells. Each node belongs to one rank; a
 //! rank's equations are contiguous and ascend with the node number.
 
+use crate::contact::fields::Fields;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::parallel::{HaloPlan, Partition, World, exchange};
@@ -19,9 +20,11 @@ pub struct Numbering {
     pub total: usize,
     /// Local index -> grid node.
     pub nodes: Vec<usize>,
+    /// Whose nodes they are. Nodes of several fields lie at the same node of the grid.
+    fields: Fields,
     /// Local index -> global equation number of the node.
     pub global: Vec<Index>,
-    /// Grid node -> local index.
+    /// Node of a field -> local index.
     pub index: NodeIndex,
     /// Owner <-> ghost exchange of nodal values.
     pub halo: HaloPlan,
@@ -42,6 +45,15 @@ impl Touched {
         world: &World,
         grid: &Grid<D>,
         partition: &Partition<D>,
+        reached: Vec<usize>,
+    ) -> Result<Self> {
+        Self::assign_by(world, |node| partition.owner_of_node(grid, node), reached)
+    }
+
+    /// [`Self::assign`] where `owner_of` gives the rank of a node. Collective.
+    pub fn assign_by(
+        world: &World,
+        owner_of: impl Fn(usize) -> usize,
         mut reached: Vec<usize>,
     ) -> Result<Self> {
         sort_distinct(&mut reached);
@@ -49,7 +61,7 @@ impl Touched {
         let mut owned = Vec::with_capacity(reached.len());
         let mut foreign = Vec::new();
         for node in reached {
-            match partition.owner_of_node(grid, node) {
+            match owner_of(node) {
                 owner if owner == here => owned.push(node),
                 owner => foreign.push((owner, node)),
             }
@@ -98,10 +110,24 @@ impl Numbering {
             offset,
             total,
             nodes,
+            fields: Fields::default(),
             global: numbers.into_iter().map(|number| number as Index).collect(),
             index,
             halo,
         })
+    }
+
+    /// The same nodes, taken as those of `fields`.
+    pub fn in_fields(mut self, fields: &Fields) -> Self {
+        if !fields.is_single() {
+            self.nodes.iter_mut().for_each(|node| *node = fields.place(*node));
+            self.fields = fields.clone();
+        }
+        self
+    }
+
+    pub fn fields(&self) -> &Fields {
+        &self.fields
     }
 
     /// Owned and ghost nodes.
@@ -114,8 +140,13 @@ impl Numbering {
         self.nodes.is_empty()
     }
 
-    /// Local index of a grid node that is active here.
+    /// Local index of the node of a field that is active here; of a grid node with a single field.
     pub fn local(&self, node: usize) -> Option<usize> {
         self.index.get(node).map(|i| i as usize)
+    }
+
+    /// Local index at a grid node of the field that a body moves in.
+    pub fn local_of(&self, body: usize, node: usize) -> Option<usize> {
+        self.local(self.fields.node(body, node))
     }
 }

@@ -4,6 +4,7 @@ use rustc_hash::FxHashMap;
 
 use crate::basis::Influences;
 use crate::basis::contract::Basis;
+use crate::contact::fields::Fields;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::{Partition, World, exchange};
@@ -86,6 +87,25 @@ impl Populated {
         }
         let (owned, further) = by_group(owned, groups);
         Ok(Populated { reached, owned, further })
+    }
+}
+
+impl Populated {
+    /// (cell, field) of the cells owned here, ascending: a cell once for each field of its bodies.
+    pub fn in_fields(&self, fields: &Fields) -> Vec<(usize, usize)> {
+        if fields.is_single() {
+            return self.owned.iter().map(|&(cell, _)| (cell, 0)).collect();
+        }
+        let mut found = Vec::new();
+        for (group, cells) in std::iter::once(&self.owned).chain(&self.further).enumerate() {
+            for &(cell, bits) in cells {
+                let bodies = (0..GROUP).filter(|bit| bits >> bit & 1 == 1);
+                found.extend(bodies.map(|bit| (cell, fields.of_body(group * GROUP + bit))));
+            }
+        }
+        found.sort_unstable();
+        found.dedup();
+        found
     }
 }
 

@@ -13,6 +13,7 @@ use super::terms::surface;
 use crate::basis::centre::{Moments, RowNodes};
 use crate::basis::contract::{self, Basis};
 use crate::basis::{Groups, Influences, radial};
+use crate::contact::fields::Fields;
 use crate::deck::model::{Locking, PointVolume, Symmetry};
 use crate::error::{Error, Result};
 use crate::ghost::{FaceStencil, boundary_faces, face_stencils};
@@ -124,7 +125,11 @@ impl<const D: usize> Discretisation<D> {
             let turned = radial::make_rings(grid, basis, points, &mut influences);
             world.fail_together(turned)?;
         }
-        let groups = Groups::new(&influences);
+        let fields = &model.contacts.fields;
+        let groups = match fields.is_single() {
+            true => Groups::new(&influences),
+            false => Groups::renamed(&influences, |p, n| fields.node(points.body[p] as usize, n)),
+        };
         let kinds = (basis, model.deck.bodies.len());
         let populated = Populated::find(world, grid, partition, kinds, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {
@@ -139,15 +144,19 @@ impl<const D: usize> Discretisation<D> {
         // What holds the rows' nodes: where they are those of the populated cells, these are fewer.
         let mut reached: Vec<usize> =
             faces.iter().flat_map(|face| face.nodes.iter().copied()).collect();
-        append_nodes(world, grid, &populated, &mut reached);
-        if !basis.within_cells() {
+        if fields.is_single() {
+            append_nodes(world, grid, &populated, &mut reached);
+        } else {
+            append_nodes_of_fields(grid, &populated, fields, &mut reached);
+        }
+        if !basis.within_cells() || !fields.is_single() {
             reached.extend_from_slice(&groups.nodes);
         }
-        let touched = Touched::assign(world, grid, partition, reached)?;
+        let owner_of = |node| partition.owner_of_node(grid, fields.place(node));
+        let touched = Touched::assign_by(world, owner_of, reached)?;
         let supports = (0..groups.len())
             .map(|g| groups.nodes(g))
             .chain(faces.iter().map(|face| face.nodes.as_slice()));
-        let owner_of = |node| partition.owner_of_node(grid, node);
         let (numbering, pattern) = match coupling {
             Coupling::Matrix | Coupling::Mass => {
                 pattern::build(world, touched, owner_of, supports)?
@@ -157,6 +166,7 @@ impl<const D: usize> Discretisation<D> {
             }
         };
 
+        let numbering = numbering.in_fields(fields);
         let group_nodes = world.fail_together(locals(&numbering, &groups.nodes))?;
         if model.deck.method.locking == Locking::FBar {
             let rows = RowNodes { groups: &groups, nodes: &group_nodes, count: numbering.len() };
@@ -339,6 +349,21 @@ fn append_nodes<const D: usize>(
     });
     for &cell in populated.owned.iter().map(|(cell, _)| cell).chain(of_others) {
         grid.cell_nodes(cell, nodes);
+    }
+}
+
+/// Appends the nodes of the populated cells owned here, in each field that populates them.
+fn append_nodes_of_fields<const D: usize>(
+    grid: &Grid<D>,
+    populated: &Populated,
+    fields: &Fields,
+    nodes: &mut Vec<usize>,
+) {
+    let mut below = Vec::new();
+    for (cell, field) in populated.in_fields(fields) {
+        below.clear();
+        grid.cell_nodes(cell, &mut below);
+        nodes.extend(below.iter().map(|&node| fields.at(field, node)));
     }
 }
 

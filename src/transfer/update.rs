@@ -283,7 +283,8 @@ pub fn require_sound_domains<const D: usize>(
     if !functions.domains_deform() {
         return Ok(());
     }
-    let nodal = |node| nodal_displacement(numbering, displacement, node);
+    let body = |p: usize| points.body[p] as usize;
+    let nodal = |p, node| nodal_displacement(numbering, displacement, (body(p), node));
     let Increments { deformation, displacement: moved, corners, .. } = increments;
     let rings = !deformation.hoops.is_empty();
     let step = DomainStep { grids, increments: &deformation.blocks, moved, nodal: &nodal, rings };
@@ -299,13 +300,13 @@ pub fn require_sound_domains<const D: usize>(
     }
 }
 
-/// m; zero where no equation lives.
+/// At a node of the grid in the field of a body, m; zero where no equation lives.
 fn nodal_displacement<const D: usize>(
     numbering: &Numbering,
     displacement: &[f64],
-    node: usize,
+    (body, node): (usize, usize),
 ) -> [f64; D] {
-    match numbering.local(node) {
+    match numbering.local_of(body, node) {
         Some(local) => std::array::from_fn(|i| displacement[local * D + i]),
         None => [0.0; D],
     }
@@ -457,11 +458,14 @@ pub fn follow<const D: usize>(
         points.corners.copy_from_slice(&increments.corners);
     }
     let Increments { deformation, displacement: moved, .. } = increments;
+    // With a single field it is no matter whose node it is.
+    let bodies = if numbering.fields.is_single() { Vec::new() } else { points.body.clone() };
+    let body = |p: usize| bodies.get(p).map_or(0, |body| *body as usize);
     let step = DomainStep {
         grids: [&model.grid; 2],
         increments: &deformation.blocks,
         moved,
-        nodal: &|node| nodal_displacement(numbering, displacement, node),
+        nodal: &|p, node| nodal_displacement(numbering, displacement, (body(p), node)),
         rings: model.deck.analysis.symmetry == Symmetry::Axisymmetric,
     };
     contract::of_deck(method.basis, method.gimp_edge).update_domains(

@@ -81,21 +81,29 @@ pub struct RigidRotation {
     pub degrees: Expression,
 }
 
-/// A body on a rigid body.
+/// A body on a rigid body or on another body.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contact {
     pub name: String,
-    /// Index into `Deck::rigids`.
-    pub rigid: usize,
-    /// Index into `Deck::bodies`.
+    pub partner: Partner,
+    /// Index into `Deck::bodies`; of two bodies the first one.
     pub body: usize,
     pub friction: Friction,
     /// Pa
     pub adhesion: f64,
     /// Pa
     pub max_shear: Option<f64>,
-    /// Times the body's stiffness over the cell size.
+    /// Times the body's stiffness over the cell size; not read between two bodies.
     pub penalty: f64,
+}
+
+/// What a body touches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Partner {
+    /// Index into `Deck::rigids`.
+    Rigid(usize),
+    /// Index into `Deck::bodies`.
+    Body(usize),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,6 +1,6 @@
 //! Rigid bodies and contacts.
 
-use crate::deck::model::{Deck, Friction, RigidMotion, RigidShape};
+use crate::deck::model::{Deck, Friction, Partner, RigidMotion, RigidShape};
 
 use super::writer::{Writer, array, expression, expressions, inline, number, quote, vector};
 
@@ -37,7 +37,11 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
     for contact in &deck.contacts {
         w.table("[[contact]]");
         w.line("contact", "name", quote(&contact.name));
-        let names = [&deck.rigids[contact.rigid].name, &deck.bodies[contact.body].name];
+        let body = &deck.bodies[contact.body].name;
+        let names = match contact.partner {
+            Partner::Rigid(rigid) => [&deck.rigids[rigid].name, body],
+            Partner::Body(other) => [body, &deck.bodies[other].name],
+        };
         w.line("contact", "between", array(names.map(|name| quote(name))));
         let friction = match contact.friction {
             Friction::Coulomb(coefficient) => number(coefficient),
@@ -46,7 +50,9 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
         w.line("contact", "friction", friction);
         w.line("contact", "adhesion", number(contact.adhesion));
         w.optional("contact", "max_shear", contact.max_shear.map(number));
-        w.line("contact", "penalty", number(contact.penalty));
+        if let Partner::Rigid(_) = contact.partner {
+            w.line("contact", "penalty", number(contact.penalty));
+        }
     }
 }
 

@@ -110,12 +110,12 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "contact",
         header: "[[contact]]",
-        doc: "A body on a rigid body: a penalty keeps the corners of the domains of its points (gimp, cpdi1, cpdi2), or its points (mpm), outside.",
+        doc: "A body on a rigid body: a penalty keeps the corners of the domains of its points (gimp, cpdi1, cpdi2), or its points (mpm), outside. Two bodies, in explicit runs with a lumped mass: each moves in a velocity field of its own, and impulses at the nodes that both reach keep them apart where their domains meet.",
         keys: &[
             key("name", Text, Optional("the two names with a hyphen between"),
                 "Names the columns of the history, unique."),
-            key("between", Special("an array of the names of a rigid body and a body"), Required,
-                "Who touches whom. Two bodies meet on the grid, which lets them not slip: no contact can be asked for there."),
+            key("between", Special("an array of the names of a rigid body and a body, or of two bodies"), Required,
+                "Who touches whom. Bodies that no contact names together meet on the grid without slip."),
             key("friction", Special("a number of at least 0, or \"rough\""), Default("0.0"),
                 "Coulomb's coefficient; 0: smooth; \"rough\": no slip."),
             key("adhesion", Number, Default("0.0"), "Tangential traction that it takes to slip, besides friction, as long as there is contact.")
@@ -123,7 +123,7 @@ pub const SECTIONS: &[Section] = &[
             key("max_shear", Number, Optional("none"), "Largest tangential traction, whatever the pressure.")
                 .unit("Pa").range(POSITIVE),
             key("penalty", Number, Default("10.0"),
-                "Pressure over depth, times the body's stiffness over the cell size: a pressure p goes p h / (penalty E) deep.")
+                "On a rigid body: pressure over depth, times the body's stiffness over the cell size: a pressure p goes p h / (penalty E) deep.")
                 .range(POSITIVE),
         ],
     },

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use super::shapes;
 use crate::deck::model::{
-    Boundary, Contact, FreeRigid, Friction, Rigid, RigidMotion, RigidRotation, RigidShape,
+    Analysis, AnalysisType, Boundary, Contact, FreeRigid, Friction, Mass, Method, Partner, Rigid,
+    RigidMotion, RigidRotation, RigidShape,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -145,11 +146,12 @@ fn motion(table: &Table<'_>, dimension: usize) -> Got<RigidMotion> {
     })
 }
 
-/// `rigids`: as read, if that succeeded; `bodies`: names as written.
+/// `rigids`, `analysis`, `method`: as read, if that succeeded; `bodies`: names as written.
 pub fn contacts(
     root: &Table<'_>,
     rigids: Option<&[Rigid]>,
     bodies: &[String],
+    (analysis, method): (Option<&Analysis>, Option<&Method>),
 ) -> Got<Vec<Contact>> {
     let mut names: Vec<String> = Vec::new();
     root.tables("contact", |_, table| {
@@ -157,7 +159,10 @@ pub fn contacts(
         let friction = friction(&table);
         let (adhesion, most) = (table.number("adhesion"), table.number_if("max_shear"));
         let penalty = table.number("penalty");
-        let (rigid, body, joined) = pair?;
+        let (partner, body, joined) = pair?;
+        if matches!(partner, Partner::Body(_)) {
+            of_two_bodies(&table, analysis, method)?;
+        }
         let name = table.text_if("name")?.unwrap_or(joined);
         if names.contains(&name) {
             return Err(table.problem("name", format!("another contact is called \"{name}\"")));
@@ -172,16 +177,42 @@ pub fn contacts(
             let message = "has no effect on a smooth surface: friction and adhesion are zero";
             return Err(table.problem("max_shear", message));
         }
-        Ok(Contact { name, rigid, body, friction, adhesion, max_shear, penalty: penalty? })
+        Ok(Contact { name, partner, body, friction, adhesion, max_shear, penalty: penalty? })
     })
 }
 
-/// Indices of the rigid body and the body, and both names in one.
+/// Two bodies touch in velocity fields of their own, which explicit steps with a lumped mass know.
+fn of_two_bodies(
+    table: &Table<'_>,
+    analysis: Option<&Analysis>,
+    method: Option<&Method>,
+) -> Got<()> {
+    if analysis.is_some_and(|analysis| analysis.kind != AnalysisType::Explicit) {
+        let what = "two bodies touch each other in explicit runs only: equations of implicit runs hold \
+                    one displacement for all bodies at a node, so that they cannot part or slip";
+        let help = "use analysis.type = \"explicit\", describe one of them as a [[rigid]] body, or \
+                    leave this contact out: the bodies then meet without slip";
+        return Err(table.problem_with_help("between", what, help));
+    }
+    if method.is_some_and(|method| method.mass != Mass::Lumped) {
+        let what = "contact of two bodies takes a lumped mass: impulses at a node would move its \
+                    neighbours with a consistent one";
+        return Err(table.problem_with_help("between", what, "set method.mass = \"lumped\""));
+    }
+    if table.given("penalty") {
+        let what =
+            "has no effect between two bodies, which impulses at the nodes keep apart exactly";
+        return Err(table.problem("penalty", what));
+    }
+    Ok(())
+}
+
+/// What the body touches, the body's index, and both names in one.
 fn between(
     table: &Table<'_>,
     rigids: Option<&[Rigid]>,
     bodies: &[String],
-) -> Got<(usize, usize, String)> {
+) -> Got<(Partner, usize, String)> {
     let Some(node) = table.node("between") else { return Err(table.missing("between", "")) };
     let names = match &node.value {
         Value::Array(items) => items
@@ -209,19 +240,21 @@ fn between(
         }
     }
     match (rigid(first), body(second), rigid(second), body(first)) {
-        (Some(r), Some(b), ..) | (_, _, Some(r), Some(b)) => Ok((r, b, format!("{first}-{second}"))),
+        (Some(r), Some(b), ..) | (_, _, Some(r), Some(b)) => {
+            Ok((Partner::Rigid(r), b, format!("{first}-{second}")))
+        }
         (Some(_), _, Some(_), _) => Err(table.problem(
             "between",
             format!("\"{first}\" and \"{second}\" are both rigid: only a body yields"),
         )),
-        _ => Err(table.problem_with_help(
-            "between",
-            format!(
-                "\"{first}\" and \"{second}\" are both bodies: they meet on the grid, which lets them \
-                 not slip, and no other contact of two bodies is known"
-            ),
-            "describe one of them as a [[rigid]] body, or leave this contact out",
-        )),
+        (_, Some(two), _, Some(one)) if one != two => {
+            Ok((Partner::Body(two), one, format!("{first}-{second}")))
+        }
+        _ => {
+            let what =
+                format!("a body does not touch itself: expected another name than \"{first}\"");
+            Err(table.problem("between", what))
+        }
     }
 }
 

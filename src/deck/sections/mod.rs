@@ -85,7 +85,10 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let boundaries = conditions::boundaries(&root, &earlier, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &earlier, &names, bodies.as_deref().ok());
     let rigids = contact::rigids(&root, directory, dimension, boundaries.as_deref().ok());
-    let contacts = contact::contacts(&root, rigids.as_deref().ok(), &names);
+    let contacts = {
+        let choices = (analysis.as_ref().ok(), method.as_ref().ok());
+        contact::contacts(&root, rigids.as_deref().ok(), &names, choices)
+    };
     let verify = results::verify(&root, dimension);
     let probes = probes::probes(&root, dimension, &names);
     if let (Ok(method), Ok(boundaries)) = (&method, &boundaries) {

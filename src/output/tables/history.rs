@@ -3,6 +3,7 @@
 use mpi::topology::SimpleCommunicator;
 
 use super::csv_table::{CsvTable, Mark};
+use crate::deck::model::{Contact, Partner};
 use crate::error::Result;
 use crate::output::directory::{HISTORY, ResultsDirectory};
 use crate::output::terminal::log::Log;
@@ -20,7 +21,7 @@ pub struct HistoryColumns {
     pub rigids: Vec<String>,
     /// Names of the rigid bodies that move freely, in deck order.
     pub free: Vec<String>,
-    pub contacts: Vec<String>,
+    pub contacts: Vec<ContactName>,
     /// A conditioning run.
     pub conditioning: bool,
     /// The deck names stages.
@@ -29,6 +30,21 @@ pub struct HistoryColumns {
     pub damped: bool,
     /// A strength reduction.
     pub reduced: bool,
+}
+
+/// A contact of the deck.
+#[derive(Debug, Clone, Default)]
+pub struct ContactName {
+    pub name: String,
+    /// It is one of two bodies, which have no reaction columns.
+    pub of_bodies: bool,
+}
+
+impl ContactName {
+    pub fn of(contact: &Contact) -> Self {
+        let of_bodies = matches!(contact.partner, Partner::Body(_));
+        ContactName { name: contact.name.clone(), of_bodies }
+    }
 }
 
 /// Name and unit of a column.
@@ -80,6 +96,8 @@ pub struct HistoryRow {
     pub energy_contact: f64,
     /// Dissipated by friction so far.
     pub dissipation_friction: f64,
+    /// Lost by bodies that meet so far.
+    pub dissipation_impact: f64,
     pub ghost_faces: usize,
     pub populated_cells: usize,
     /// Step cuts so far.
@@ -113,8 +131,10 @@ pub struct ContactState {
     pub area: f64,
     /// So far, the mean over the area in contact, m.
     pub slip: f64,
-    /// Depth of the deepest corner, m.
+    /// Depth of the deepest corner, or overlap of two bodies, m.
     pub gap_max: f64,
+    /// Of the first of two bodies on the second, N.
+    pub force: [f64; 3],
 }
 
 /// A rigid body that moves freely, at the end of a step.
@@ -199,8 +219,13 @@ fn cells(layout: &HistoryColumns, row: &HistoryRow) -> Vec<(Column, f64)> {
         cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
         cell(format!("reaction.{name}.torque"), torque, reaction.torque);
     }
-    for (index, name) in layout.contacts.iter().enumerate() {
+    for (index, ContactName { name, of_bodies }) in layout.contacts.iter().enumerate() {
         let state = row.contacts.get(index).copied().unwrap_or_default();
+        if *of_bodies {
+            for (axis, value) in axes.iter().zip(state.force).take(layout.dimension) {
+                cell(format!("contact.{name}.{axis}"), force, value);
+            }
+        }
         cell(format!("contact.{name}.area"), unit("m2", "m"), state.area);
         cell(format!("contact.{name}.slip"), "m", state.slip);
         cell(format!("contact.{name}.gap_max"), "m", state.gap_max);
@@ -223,6 +248,9 @@ fn cells(layout: &HistoryColumns, row: &HistoryRow) -> Vec<(Column, f64)> {
     if !layout.contacts.is_empty() {
         cell("energy_contact".into(), energy, row.energy_contact);
         cell("dissipation_friction".into(), energy, row.dissipation_friction);
+        if layout.contacts.iter().any(|contact| contact.of_bodies) {
+            cell("dissipation_impact".into(), energy, row.dissipation_impact);
+        }
     }
     cell("ghost_faces".into(), "-", row.ghost_faces as f64);
     cell("populated_cells".into(), "-", row.populated_cells as f64);
@@ -319,7 +347,7 @@ mod tests {
             boundaries: vec!["a".into(), "b".into()],
             rigids: vec!["cone".into()],
             free: vec!["ball".into()],
-            contacts: vec!["cone-a".into()],
+            contacts: vec![ContactName { name: "cone-a".into(), of_bodies: true }],
             conditioning: true,
             staged: true,
             damped: true,
@@ -331,7 +359,13 @@ mod tests {
             momentum: [0.0, 6.0, 0.0],
             reactions: vec![Reaction::default(), reaction],
             rigids: vec![Reaction { torque: 9.0, ..reaction }],
-            contacts: vec![ContactState { area: 1.5, slip: 2.5, gap_max: 3.5 }],
+            contacts: vec![ContactState {
+                area: 1.5,
+                slip: 2.5,
+                gap_max: 3.5,
+                force: [0.0, 6.5, 0.0],
+            }],
+            dissipation_impact: 5.5,
             energy_contact: 4.5,
             conditioning: Conditioning { cfl_ghost: 7.0, ..Default::default() },
             ..Default::default()
@@ -346,6 +380,7 @@ mod tests {
         assert_eq!(value("reaction.b.held"), 8.0);
         assert_eq!((value("reaction.cone.y"), value("reaction.cone.torque")), (2.0, 9.0));
         assert_eq!((value("contact.cone-a.slip"), value("energy_contact")), (2.5, 4.5));
+        assert_eq!((value("contact.cone-a.y"), value("dissipation_impact")), (6.5, 5.5));
         assert_eq!(value("cfl_ghost"), 7.0);
     }
 }

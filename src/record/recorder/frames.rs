@@ -73,14 +73,18 @@ impl Recorder {
         let mut connectivity = Vec::new();
         let mut nodes = Vec::new();
         let on_face: std::collections::BTreeSet<usize> = mesh.ghost_cells.iter().copied().collect();
-        for &(cell, _) in &mesh.populated.owned {
+        // A cell once for each velocity field in it.
+        let fields = mesh.numbering.fields();
+        for (cell, field) in mesh.populated.in_fields(fields) {
             nodes.clear();
             grid.cell_nodes(cell, &mut nodes);
             // A cell whose nodes this rank does not all know is written by nobody: it cannot
             // happen, as owners of populated cells reach their nodes.
             let numbers: Option<Vec<usize>> = nodes
                 .iter()
-                .map(|&node| numbering.local(node).map(|l| numbering.global[l] as usize))
+                .map(|&node| {
+                    numbering.local(fields.at(field, node)).map(|l| numbering.global[l] as usize)
+                })
                 .collect();
             if let Some(numbers) = numbers {
                 connectivity.extend(numbers);

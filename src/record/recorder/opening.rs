@@ -11,7 +11,7 @@ use crate::output::series::points_file::PointsSeries;
 use crate::output::series::rigid_file::RigidSeries;
 use crate::output::summary::Count;
 use crate::output::tables::csv_table::Mark;
-use crate::output::tables::history::{History, HistoryColumns};
+use crate::output::tables::history::{ContactName, History, HistoryColumns};
 use crate::output::tables::residuals::Residuals;
 use crate::output::terminal::log::Log;
 use crate::output::terminal::progress::{Interval, Progress};
@@ -63,7 +63,7 @@ impl Recorder {
                 let free = deck.rigids.iter().filter(|rigid| rigid.free.is_some());
                 free.map(|rigid| rigid.name.clone()).collect()
             },
-            contacts: deck.contacts.iter().map(|contact| contact.name.clone()).collect(),
+            contacts: deck.contacts.iter().map(ContactName::of).collect(),
             conditioning: deck.analysis.kind == AnalysisType::Conditioning,
             staged: deck.is_staged(),
             damped: deck.analysis.damping.is_some(),

@@ -209,7 +209,8 @@ impl<const D: usize> ContactTerm<D> {
         if let Some(values) = values {
             for (&node, &weight) in values.nodes.iter().zip(&values.weights).take(values.count) {
                 // A node that is none of the point's has no weight but for round-off.
-                if let Some(local) = mesh.numbering.local(node).map(|local| local as u32)
+                let local = mesh.numbering.local_of(points.body[p] as usize, node);
+                if let Some(local) = local.map(|local| local as u32)
                     && nodes.contains(&local)
                 {
                     self.nodes.push(local);
@@ -521,12 +522,20 @@ impl Exerted {
 /// A contact at the end of a step, this rank's share.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Touching {
+    /// Index into the deck's contacts.
+    pub index: usize,
     /// m2 (m in 2D)
     pub area: f64,
     /// Σ A times the slip of the step, m3 (m2 in 2D).
     pub slid: f64,
     /// Of the deepest corner, m.
     pub depth: f64,
+}
+
+impl Touching {
+    fn of(index: usize) -> Self {
+        Touching { index, ..Touching::default() }
+    }
 }
 
 /// What a step of contact leaves, this rank's share.
@@ -550,7 +559,7 @@ impl<const D: usize> Finished<D> {
     fn new(contacts: &Contacts<D>) -> Self {
         Finished {
             rigids: vec![Exerted::default(); contacts.rigids.len()],
-            pairs: vec![Touching::default(); contacts.pairs.len()],
+            pairs: contacts.pairs.iter().map(|pair| Touching::of(pair.index)).collect(),
             energy: 0.0,
             dissipation: 0.0,
             work: 0.0,
