@@ -1,8 +1,8 @@
 //! Contact of two bodies in an explicit step: impulses at the nodes that their fields share, after all
 //! other forces have acted (law: [`crate::contact::nodal`]).
 //!
-//! Fields of bodies that no contact names together get one velocity at the nodes they share, as all
-//! bodies have on one field.
+//! Fields of bodies that no contact names together leave the step with one velocity at the nodes they
+//! share, so that they do not slip on each other.
 
 use crate::contact::nodal::Exchange;
 use crate::error::Result;
