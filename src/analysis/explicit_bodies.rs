@@ -1,22 +1,25 @@
 //! Contact of two bodies in an explicit step: impulses at the nodes that their fields share, after all
 //! other forces have acted (law: [`crate::contact::nodal`]).
 //!
-//! Fields of bodies that no contact names together leave the step with one velocity at the nodes they
-//! share, so that they do not slip on each other.
+//! Fields of bodies that no contact names together move as one at the nodes they share.
 
-use crate::contact::nodal::Exchange;
+use crate::contact::nodal::{Exchange, Meeting};
+use crate::contact::told::{self, Told};
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
 use crate::record::contact::Met;
 use crate::system::model::Model;
-use crate::system::shared_nodes::{self, SharedNode};
+use crate::system::shared_nodes::SharedNode;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::contact::TOUCH;
 use crate::tensor::dense::dot;
 
-/// Passes over the pairs of fields at a node with more than two of them.
+/// Passes over the pairs of bodies at a node with more than one.
 const PASSES: usize = 50;
+
+/// Slip in a step, of a cell, up to which a node sticks: round-off.
+const STILL: f64 = 1e-12;
 
 /// What the step knows at its nodes.
 pub(super) struct AtNodes<'a> {
@@ -29,53 +32,109 @@ pub(super) struct AtNodes<'a> {
     pub dt: f64,
 }
 
-/// Adds the impulses to the nodal acceleration and, as forces, to what has `pushed`; at owned nodes. One
-/// [`Met`] for each pair of bodies, this rank's share. Collective.
+/// Adds the impulses at the `shared` nodes to the nodal acceleration and, as forces, to what has
+/// `pushed`; at owned nodes. One [`Met`] for each pair of bodies, this rank's share, and what points are
+/// told. Collective.
 pub(super) fn meet<const D: usize>(
     world: &World,
     model: &Model<D>,
     mesh: &Discretisation<D>,
-    points: &Points<D>,
+    (points, shared): (&Points<D>, &[SharedNode<D>]),
     at: &AtNodes<'_>,
     acceleration: &mut [f64],
     pushed: &mut [[f64; D]],
-) -> Result<Vec<Met>> {
+) -> Result<(Vec<Met>, Vec<Told<D>>)> {
     let pairs = &model.contacts.body_pairs;
     let mut met: Vec<Met> = pairs.iter().map(|pair| Met::of(pair.index)).collect();
-    for shared in shared_nodes::find(world, model, mesh, points, at.mass)? {
-        let mut here = Here::new(model, at, &shared, acceleration);
-        let unions = shared.fields.len() * (shared.fields.len() - 1) / 2;
-        for _ in 0..if unions > 1 { PASSES } else { 1 } {
-            here.exchange(&shared, &mut met);
+    let mut at_nodes = match model.contacts.tells {
+        true => vec![0.0; mesh.numbering.len() * (D + OTHERS)],
+        false => Vec::new(),
+    };
+    for shared in shared.iter().filter(|shared| !shared.meetings.is_empty()) {
+        let mut here = Here::new(model, at, shared, acceleration);
+        let count = shared.meetings.len();
+        for pass in 0..if count > 1 { PASSES } else { 1 } {
+            for meeting in &shared.meetings {
+                here.touch(meeting, pass == 0, &mut met);
+            }
         }
-        for (one, (_, node)) in here.fields.iter().zip(&shared.fields) {
-            for i in 0..D {
-                pushed[*node][i] += one.impulse[i] / at.dt;
-                acceleration[node * D + i] += one.compliance[i] * one.impulse[i] / at.dt;
+        for (class, nodes) in here.classes.iter().zip(&shared.classes) {
+            for &(_, node) in nodes {
+                let share = at.mass[node] / class.mass;
+                for i in 0..D {
+                    pushed[node][i] += share * class.impulse[i] / at.dt;
+                    acceleration[node * D + i] += class.compliance[i] * class.impulse[i] / at.dt;
+                }
+                if let (true, Some(state)) = (model.contacts.tells, class.state) {
+                    let words = &mut at_nodes[node * (D + OTHERS)..][..D + OTHERS];
+                    for (word, j) in words.iter_mut().zip(&class.impulse) {
+                        *word = j / (at.dt * class.mass);
+                    }
+                    words[D..].copy_from_slice(&state);
+                }
             }
         }
     }
-    Ok(met)
+    let told = match model.contacts.tells {
+        true => told(world, model, mesh, points, at_nodes)?,
+        false => Vec::new(),
+    };
+    Ok((met, told))
 }
 
-/// A field at a shared node.
-struct Field<const D: usize> {
+/// Words of a node behind the components of its force over its mass: gap, way slid, status.
+const OTHERS: usize = 3;
+
+/// What nodes in contact tell the points that they move: of the force at a node each takes the share of
+/// its mass. Collective.
+fn told<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    mesh: &Discretisation<D>,
+    points: &Points<D>,
+    mut at_nodes: Vec<f64>,
+) -> Result<Vec<Told<D>>> {
+    let width = D + OTHERS;
+    mesh.numbering.halo.forward(world, &mut at_nodes, width)?;
+    let step = mesh.step_points(points, &model.materials);
+    let mut told = Vec::new();
+    for point in 0..points.len() {
+        for (&node, entry) in step.nodes_of(point).iter().zip(step.influences.row(point)) {
+            let words = &at_nodes[node as usize * width..][..width];
+            let weight = step.influences.weights[entry];
+            if words[D + 2] == 0.0 || weight <= 0.0 {
+                continue;
+            }
+            let force = std::array::from_fn(|i| points.mass[point] * weight * words[i]);
+            let (gap, slid, status) = (words[D], words[D + 1], words[D + 2]);
+            told.push(Told { point, force, gap, slid, status });
+        }
+    }
+    Ok(told)
+}
+
+/// Fields that move as one at a shared node.
+struct Class<const D: usize> {
+    /// kg
+    mass: f64,
     /// At the step's start, m/s.
     start: [f64; D],
-    /// At the step's end, m/s.
+    /// At its end, m/s.
     velocity: [f64; D],
-    /// 1/kg; zero where it is held.
+    /// 1/kg; zero where one of them is held.
     compliance: [f64; D],
     /// N s
     impulse: [f64; D],
+    /// Gap, way slid and status of its contacts, if there are any.
+    state: Option<[f64; OTHERS]>,
 }
 
-/// A shared node while its fields exchange impulses.
+/// A shared node while its classes exchange impulses.
 struct Here<'a, const D: usize> {
     model: &'a Model<D>,
     dt: f64,
-    /// As in [`SharedNode::fields`].
-    fields: Vec<Field<D>>,
+    /// As in [`SharedNode::classes`].
+    classes: Vec<Class<D>>,
 }
 
 impl<'a, const D: usize> Here<'a, D> {
@@ -85,100 +144,66 @@ impl<'a, const D: usize> Here<'a, D> {
         shared: &SharedNode<D>,
         acceleration: &[f64],
     ) -> Self {
-        let field = |&(_, node): &(usize, usize)| {
-            let dof = |i: usize| node * D + i;
-            Field {
-                start: std::array::from_fn(|i| at.velocity[dof(i)]),
+        let class = |nodes: &Vec<(usize, usize)>| {
+            let first = nodes[0].1 * D;
+            let mass = nodes.iter().map(|(_, node)| at.mass[*node]).sum::<f64>();
+            let held = |i: usize| nodes.iter().any(|(_, node)| at.fixed[node * D + i]);
+            Class {
+                mass,
+                start: std::array::from_fn(|i| at.velocity[first + i]),
                 velocity: std::array::from_fn(|i| {
-                    at.velocity[dof(i)] + at.dt * acceleration[dof(i)]
+                    at.velocity[first + i] + at.dt * acceleration[first + i]
                 }),
-                compliance: std::array::from_fn(|i| match at.fixed[dof(i)] {
-                    true => 0.0,
-                    false => 1.0 / at.mass[node],
-                }),
+                compliance: std::array::from_fn(|i| if held(i) { 0.0 } else { 1.0 / mass }),
                 impulse: [0.0; D],
+                state: None,
             }
         };
-        Here { model, dt: at.dt, fields: shared.fields.iter().map(field).collect() }
+        Here { model, dt: at.dt, classes: shared.classes.iter().map(class).collect() }
     }
 
-    /// Lets each two fields exchange their impulse once.
-    fn exchange(&mut self, shared: &SharedNode<D>, met: &mut [Met]) {
-        let contacts = &self.model.contacts;
-        for a in 0..shared.fields.len() {
-            for b in a + 1..shared.fields.len() {
-                let both = [shared.fields[a].0, shared.fields[b].0];
-                let named = contacts.body_pairs.iter().position(|pair| {
-                    let own = pair.bodies.map(|body| contacts.fields.of_body(body));
-                    own == both || own == [both[1], both[0]]
-                });
-                match named {
-                    None => self.join(a, b),
-                    Some(pair) => self.touch(shared, pair, [a, b], met),
-                }
-            }
-        }
-    }
-
-    /// v_b - v_a, m/s, and what it gains per impulse, 1/kg.
-    fn between(&self, a: usize, b: usize) -> ([f64; D], [f64; D]) {
-        let (a, b) = (&self.fields[a], &self.fields[b]);
-        let relative = std::array::from_fn(|i| b.velocity[i] - a.velocity[i]);
-        (relative, std::array::from_fn(|i| a.compliance[i] + b.compliance[i]))
-    }
-
-    fn push(&mut self, a: usize, b: usize, impulse: &[f64; D]) {
-        for (index, sign) in [(a, -1.0), (b, 1.0)] {
-            let field = &mut self.fields[index];
-            for i in 0..D {
-                field.impulse[i] += sign * impulse[i];
-                field.velocity[i] += sign * field.compliance[i] * impulse[i];
-            }
-        }
-    }
-
-    /// One velocity for both.
-    fn join(&mut self, a: usize, b: usize) {
-        let (relative, compliance) = self.between(a, b);
-        let impulse = std::array::from_fn(|i| match compliance[i] {
-            0.0 => 0.0,
-            w => -relative[i] / w,
-        });
-        self.push(a, b, &impulse);
-    }
-
-    /// The law of a pair of bodies, in the fields `a` and `b`.
-    fn touch(&mut self, shared: &SharedNode<D>, pair: usize, [a, b]: [usize; 2], met: &mut [Met]) {
-        let Some((_, meeting)) = shared.meetings.iter().find(|(own, _)| *own == pair) else {
-            return;
-        };
-        let contacts = &self.model.contacts;
-        let of = &contacts.body_pairs[pair];
-        let swapped = contacts.fields.of_body(of.bodies[0]) != shared.fields[a].0;
-        let (first, second) = if swapped { (b, a) } else { (a, b) };
-        let (relative, compliance) = self.between(first, second);
-        let reach = (TOUCH * self.model.grid.cell_size(), self.dt);
+    /// Lets two bodies exchange their impulse; `counts`: for the first time in the step.
+    fn touch(
+        &mut self,
+        (pair, both, meeting): &(usize, [usize; 2], Meeting<D>),
+        counts: bool,
+        met: &mut [Met],
+    ) {
+        let [a, b] = both.map(|class| &self.classes[class]);
+        let difference =
+            |a: &[f64; D], b: &[f64; D]| -> [f64; D] { std::array::from_fn(|i| b[i] - a[i]) };
+        let (start, relative) =
+            (difference(&a.start, &b.start), difference(&a.velocity, &b.velocity));
+        let compliance = std::array::from_fn(|i| a.compliance[i] + b.compliance[i]);
+        let (cell, of) = (self.model.grid.cell_size(), &self.model.contacts.body_pairs[*pair]);
+        let reach = (TOUCH * cell, self.dt);
         let Some(exchange) = meeting.exchange(of.friction, &relative, &compliance, reach) else {
             return;
         };
-        self.push(first, second, &exchange.impulse);
         let Exchange { impulse, after } = &exchange;
-        let [one, two] = [first, second].map(|k| self.fields[k].start);
-        let start = std::array::from_fn(|i| two[i] - one[i]);
-        let lost = exchange.dissipation(&start, &meeting.normal);
         let along = dot(after, &meeting.normal);
         let slip = (0..D).map(|i| (after[i] - along * meeting.normal[i]).powi(2)).sum::<f64>();
-        let met = &mut met[pair];
+        let slip = self.dt * slip.sqrt();
+        let status = if slip > STILL * cell { told::SLIDES } else { told::STICKS };
+        for (class, sign) in both.iter().zip([-1.0, 1.0]) {
+            let class = &mut self.classes[*class];
+            for i in 0..D {
+                class.impulse[i] += sign * impulse[i];
+                class.velocity[i] += sign * class.compliance[i] * impulse[i];
+            }
+            let [gap, slid, before] = class.state.unwrap_or_default();
+            class.state = Some([gap.min(meeting.gap), slid.max(slip), before.max(status)]);
+        }
+        let met = &mut met[*pair];
         for (force, j) in met.force.iter_mut().zip(impulse) {
             *force += j / self.dt;
         }
-        // Once for a node that is passed over many times.
-        if met.last != Some(shared.fields[a].1) {
-            met.last = Some(shared.fields[a].1);
+        if counts {
             met.area += meeting.area;
-            met.slid += meeting.area * self.dt * slip.sqrt();
+            met.slid += meeting.area * slip;
             met.depth = met.depth.max(-meeting.gap);
         }
+        let lost = exchange.dissipation(&start, &meeting.normal);
         met.friction += lost[0];
         met.impact += lost[1];
     }

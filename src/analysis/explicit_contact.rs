@@ -1,7 +1,6 @@
 //! Contact in explicit steps: the forces of a step's start, and rigid bodies that move freely under them.
 
 use crate::contact::free::FreeBody;
-use crate::contact::motion::When;
 use crate::contact::pose::Pose;
 use crate::deck::model::Load;
 use crate::deck::{Presence, Scope};
@@ -15,7 +14,8 @@ use crate::record::contact::{ContactTotals, Met};
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
-use crate::system::terms::contact::{ContactTerm, Finished};
+use crate::system::terms::contact::ContactTerm;
+use crate::system::terms::touching::Finished;
 
 /// What contact keeps from step to step of an explicit run.
 pub(crate) struct ContactSteps<const D: usize> {
@@ -85,6 +85,9 @@ impl<const D: usize> ContactSteps<D> {
             for (rigid, (body, sums)) in self.free.iter_mut().zip(sums.chunks_exact(6)).enumerate()
             {
                 let Some(body) = body else { continue };
+                if !model.contacts.rigids[rigid].presence.is_in(span.stage) {
+                    continue;
+                }
                 let pushed = std::array::from_fn(|a| -sums[a]);
                 let torque = std::array::from_fn(|a| -sums[3 + a]);
                 body.advance(&pushed, &torque, &gravity(model, body, span), dt);
@@ -96,10 +99,7 @@ impl<const D: usize> ContactSteps<D> {
 
     /// Of the rigid bodies at a step's end.
     pub fn poses(&self, model: &Model<D>, span: StepSpan) -> Vec<Pose<D>> {
-        // Rigid bodies are there from the first stage on: s of it, then 1.
-        let end = span.seen_by(Presence::default()).end();
-        let end = When { load_factor: end.factor, time: end.time };
-        let driven = model.contacts.poses(end).into_iter();
+        let driven = model.contacts.poses(span.end()).into_iter();
         driven.zip(&self.free).map(|(pose, body)| body.as_ref().map_or(pose, |b| b.pose)).collect()
     }
 

@@ -18,6 +18,7 @@ use crate::mass::solver::MassSolver;
 use crate::points::Snapshot;
 use crate::record::clock::Clock;
 use crate::system::model::Model;
+use crate::system::shared_nodes;
 use crate::system::step_system::Discretisation;
 use crate::transfer::affine::{self, Affine};
 use crate::transfer::mapping::{self, Deformation, Pushed};
@@ -39,6 +40,8 @@ pub(crate) struct Nodes<'a, const D: usize> {
     external: &'a [[f64; D]],
     /// Force of pressures at the step's start, N: of the owned degrees of freedom, empty for none.
     pub pressed: &'a [f64],
+    /// Local nodes of fields that move as one ([`shared_nodes::joined`]).
+    pub joined: Vec<Vec<usize>>,
     dt: f64,
     /// Held components move with their boundary's mean velocity over the step.
     held_velocity: Vec<f64>,
@@ -91,6 +94,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
             inverse,
             external,
             pressed: &[],
+            joined: Vec::new(),
             dt,
             held_velocity,
             at_rest,
@@ -134,6 +138,8 @@ impl<'a, const D: usize> Nodes<'a, D> {
             let [mut velocity, mut acceleration] = timed(&mut self.seconds, || {
                 self.inverse.solve_two([&momentum, &pushed], prescribed)
             })?;
+            self.join(&mut velocity);
+            self.join(&mut acceleration);
             self.carry(step, &mut velocity)?;
             self.carry(step, &mut acceleration)?;
             (momentum, velocity, Some(Forces { pushed, acceleration }))
@@ -182,6 +188,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         self.require_mass(&pushed)?;
         let mut acceleration =
             timed(&mut self.seconds, || self.inverse.solve_summed(&pushed, &self.at_rest, None))?;
+        self.join(&mut acceleration);
         self.carry(step, &mut acceleration)?;
         Ok(Forces { pushed, acceleration })
     }
@@ -301,6 +308,22 @@ impl<'a, const D: usize> Nodes<'a, D> {
         }
     }
 
+    /// Fields that move as one take their mean by mass, at owned nodes.
+    fn join(&self, nodal: &mut [f64]) {
+        if let GridMass::Lumped(mass) = self.mass {
+            shared_nodes::join::<D>(&self.joined, mass, nodal);
+        }
+    }
+
+    /// The same with the values at the ghosts. Collective.
+    fn join_to_ghosts(&self, nodal: &mut [f64]) -> Result<()> {
+        if self.mesh.numbering.fields.is_single() {
+            return Ok(());
+        }
+        self.join(nodal);
+        self.mesh.numbering.halo.forward(self.world, nodal, D)
+    }
+
     /// Lets light nodes move along with the others. Collective.
     pub fn carry(&self, step: StepPoints<'_, D>, nodal: &mut [f64]) -> Result<()> {
         match &self.light {
@@ -320,6 +343,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let mut solved = timed(&mut self.seconds, || {
             self.inverse.solve_to_ghosts(sums, &self.held_velocity, guess)
         })?;
+        self.join_to_ghosts(&mut solved)?;
         self.carry(step, &mut solved)?;
         Ok(solved)
     }
@@ -352,6 +376,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
             }
             let mut mapped =
                 timed(&mut self.seconds, || self.inverse.solve_to_ghosts(&momentum, &term, None))?;
+            self.join_to_ghosts(&mut mapped)?;
             self.carry(step, &mut mapped)?;
             for ((t, m), s) in term.iter_mut().zip(&mapped).zip(&mut sum) {
                 *t -= m;

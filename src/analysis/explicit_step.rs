@@ -10,6 +10,7 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::following::Following;
 use crate::system::terms::stress::StepPoints;
+use crate::system::terms::touching;
 
 use super::explicit_bodies::{AtNodes, meet};
 use super::explicit_contact::ContactSteps;
@@ -25,6 +26,7 @@ use crate::record::ledger::StepSums;
 use crate::record::reactions::{at_held, reactions, supports_at_start, with_supports};
 use crate::record::step::{Solved, grid_side};
 use crate::system::model::Model;
+use crate::system::shared_nodes;
 use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::affine::Affine;
 use crate::transfer::mapping::{self, Deformation, Pushed};
@@ -66,6 +68,13 @@ pub(crate) fn advance<const D: usize>(
         let light = LightNodes::find(world, &mesh, step, grid.cell_size(), &mut mass)?;
         Ok((mass, light))
     })?;
+    let shared = match &mass {
+        GridMass::Lumped(mass) if !model.contacts.body_pairs.is_empty() => {
+            let by = (&mass[..], span.stage);
+            clock.time(Phase::Assemble, || shared_nodes::find(world, model, &mesh, points, by))?
+        }
+        _ => Vec::new(),
+    };
     let mut pressed = match Following::new(model, &mesh, points, span.start()) {
         Some(following) => following.owned_at_start(world, &mesh)?,
         None => Vec::new(),
@@ -83,6 +92,7 @@ pub(crate) fn advance<const D: usize>(
     }
     let inertia = (&mass, light, solver);
     let mut nodes = Nodes::new(world, model, &mesh, &conditions, inertia, &external, dt)?;
+    nodes.joined = shared_nodes::joined(&shared);
     nodes.pressed = pushing.as_ref().map_or(&pressed, |pushing| &pushing.force);
 
     let (mut velocity, forces) = nodes.velocity_and_forces(points, clock)?;
@@ -109,11 +119,11 @@ pub(crate) fn advance<const D: usize>(
     for (a, d) in acceleration.iter_mut().zip(&slowed) {
         *a -= d;
     }
-    let mut met = Vec::new();
+    let (mut met, mut told) = (Vec::new(), Vec::new());
     if let (false, GridMass::Lumped(mass)) = (model.contacts.body_pairs.is_empty(), &mass) {
         let at = AtNodes { mass, fixed: &conditions.fixed, velocity: &velocity, dt };
-        met = clock.time(Phase::Assemble, || {
-            meet(world, model, &mesh, points, &at, &mut acceleration, &mut pushed)
+        (met, told) = clock.time(Phase::Assemble, || {
+            meet(world, model, &mesh, (&*points, &shared), &at, &mut acceleration, &mut pushed)
         })?;
         nodes.carry(mesh.step_points(points, &model.materials), &mut acceleration)?;
     }
@@ -177,9 +187,8 @@ pub(crate) fn advance<const D: usize>(
             update::respond(&model.materials, made.straining(), points, Some(before))
         });
         update::move_points(&made.displacement, points, Some(before));
-        if let Some(touching) = &touching {
-            touching.keep_slip(points, Some(before));
-        }
+        let of_bodies = std::mem::take(&mut told);
+        touching::keep(&model.contacts, touching.as_ref(), of_bodies, points, Some(before));
         before.velocity.replace(&mut points.velocity, new_velocity);
         before.acceleration.replace(&mut points.acceleration, rate);
         if let Some(Affine { velocity_gradient, spread }) = affine {

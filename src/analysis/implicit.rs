@@ -2,9 +2,8 @@
 //! Ghost §2.4) and implicit dynamics, which is the same with inertia ([`super::inertial`]). A step:
 //! locate, map, number, {assemble, solve}*, update.
 
-use crate::contact::motion::When;
+use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
-use crate::deck::{Deck, Presence};
 use crate::error::Result;
 use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
@@ -20,6 +19,7 @@ use crate::system::step_system::{Coupling, Discretisation};
 use crate::system::terms::Term;
 use crate::system::terms::contact::ContactTerm;
 use crate::system::terms::surface::Borne;
+use crate::system::terms::touching;
 use crate::transfer::refusal::{Cause, Halt, Refusal};
 use crate::transfer::update;
 
@@ -180,9 +180,8 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let (numbering, kept) = (&mesh.numbering, before.as_deref_mut());
             let updated = update::apply(model, numbering, &displacement, &made, points, kept);
             world.fail_together(updated)?;
-            if let Some(touching) = &touching {
-                touching.keep_slip(points, before.as_deref_mut());
-            }
+            let (done, kept) = (touching.as_ref(), before.as_deref_mut());
+            touching::keep(&model.contacts, done, Vec::new(), points, kept);
             if let (Some(rates), Some(before)) = (of_points, before) {
                 before.velocity.replace(&mut points.velocity, rates.velocity);
                 before.acceleration.replace(&mut points.acceleration, rates.acceleration);
@@ -231,10 +230,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             }
         }
         row.cuts = self.stepping.cuts;
-        // As their contacts see them: s of the first stage, then 1.
-        let end = span.seen_by(Presence::default()).end();
-        let end = When { load_factor: end.factor, time: end.time };
-        let poses = run.model.contacts.poses(end);
+        let poses = run.model.contacts.poses(span.end());
         Ok(Solved { row, mesh, displacement, reaction, moved_grid, poses })
     }
 

@@ -8,6 +8,7 @@ use crate::parallel;
 use crate::points::Points;
 use crate::record::context::Run;
 use crate::record::ledger::{Entry, StepSums};
+use crate::system::apart::require_apart;
 use crate::system::conditions::StepSpan;
 use crate::transfer::{affine, update};
 
@@ -29,16 +30,19 @@ pub fn enter<const D: usize>(run: &mut Run<D>, span: StepSpan) -> Result<f64> {
     if begins && deck.stages[stage].reset_displacement {
         run.points.displacement_start.clone_from(&run.points.position);
     }
-    if !deck.has_passing_bodies() {
-        return Ok(0.0);
+    let mut gained = 0.0;
+    if deck.has_passing_bodies() {
+        let before = energy(run);
+        let gone = remove(run, stage);
+        let come = bring(run, stage)?;
+        if gone || come {
+            gained = energy(run) - before;
+        }
     }
-    let before = energy(run);
-    let gone = remove(run, stage);
-    let come = bring(run, stage)?;
-    if !gone && !come {
-        return Ok(0.0);
+    if begins && stage > 0 {
+        require_apart(run.world, &run.model, &run.points, span.start())?;
     }
-    Ok(energy(run) - before)
+    Ok(gained)
 }
 
 /// Energy of the points of all ranks, J. Collective.

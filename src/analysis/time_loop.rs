@@ -10,7 +10,7 @@
 //!     finish it: frames, mesh, migration, row of the history, checkpoint
 //! ```
 
-use crate::contact::motion::When;
+use crate::deck::When;
 use crate::error::{Error, Result};
 use crate::output::restart::run_state::RunState;
 use crate::petsc::log::Phase;
@@ -106,7 +106,7 @@ pub fn run<const D: usize>(run: &mut Run<D>, analysis: &mut impl Analysis<D>) ->
         None => {
             run.recorder.enter_stage(0);
             run.frame(0, 0.0)?;
-            let start = run.model.contacts.poses(When { load_factor: 0.0, time: 0.0 });
+            let start = run.model.contacts.poses(When::default());
             run.recorder.rigid_frame(run.world, &run.model, &start, (0, 0.0))?;
             Some(0)
         }

@@ -12,9 +12,10 @@ use super::motion::{Motion, When};
 use super::outline::Outline;
 use super::pose::Pose;
 use super::surface::{Surface, length};
+use super::told;
 use super::triangles::Triangles;
-use crate::deck::Deck;
 use crate::deck::model::{self, Basis, Partner, RigidShape, Symmetry};
+use crate::deck::{self, Deck, Presence};
 use crate::error::{Error, Result};
 
 /// A rigid body.
@@ -25,6 +26,9 @@ pub struct Rigid<const D: usize> {
     pub motion: Motion,
     /// As it begins, if it moves freely.
     pub free: Option<FreeBody<D>>,
+    pub presence: Presence,
+    /// t when it comes, s.
+    pub since: f64,
 }
 
 impl<const D: usize> Rigid<D> {
@@ -48,6 +52,8 @@ pub struct Pair {
     /// Index into the deck's bodies.
     pub body: usize,
     pub law: Law,
+    /// Of the rigid body and the contact together.
+    pub presence: Presence,
 }
 
 /// Two bodies that touch.
@@ -58,6 +64,7 @@ pub struct BodyPair {
     /// Indices into the deck's bodies.
     pub bodies: [usize; 2],
     pub friction: Friction,
+    pub presence: Presence,
 }
 
 /// All of a deck.
@@ -70,6 +77,8 @@ pub struct Contacts<const D: usize> {
     pub fields: Fields,
     /// Points are sections of rings: axisymmetry.
     pub rings: bool,
+    /// Points keep what the fields `contact_*` show.
+    pub tells: bool,
 }
 
 impl<const D: usize> Contacts<D> {
@@ -80,7 +89,7 @@ impl<const D: usize> Contacts<D> {
         let rigids = deck.rigids.iter().enumerate().map(made).collect::<Result<_>>()?;
         let (mut pairs, mut body_pairs) = (Vec::new(), Vec::new());
         for (index, contact) in deck.contacts.iter().enumerate() {
-            let friction = friction(contact);
+            let (friction, presence) = (friction(contact), contact.presence);
             match contact.partner {
                 Partner::Rigid(rigid) => pairs.push(Pair {
                     name: contact.name.clone(),
@@ -91,16 +100,18 @@ impl<const D: usize> Contacts<D> {
                         penalty: contact.penalty * stiffness[contact.body] / cell,
                         friction,
                     },
+                    presence: deck.rigids[rigid].presence.together(&presence).unwrap_or(presence),
                 }),
                 Partner::Body(other) => {
-                    body_pairs.push(BodyPair { index, bodies: [contact.body, other], friction });
+                    let bodies = [contact.body, other];
+                    body_pairs.push(BodyPair { index, bodies, friction, presence });
                 }
             }
         }
         let touching = body_pairs.iter().flat_map(|pair| pair.bodies);
         let fields = Fields::of_bodies(deck.bodies.len(), touching, nodes);
         let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
-        Ok(Contacts { rigids, pairs, body_pairs, fields, rings })
+        Ok(Contacts { rigids, pairs, body_pairs, fields, rings, tells: told::is_wanted(deck) })
     }
 
     /// Whether no body touches a rigid one.
@@ -127,24 +138,30 @@ impl<const D: usize> Contacts<D> {
         count * corners * D
     }
 
-    /// Names of the words of elastic slip that the points of each body carry.
+    /// Names of the words that the points of each body carry: elastic slip, and what they are told.
     pub fn slip_names(&self, deck: &Deck) -> Vec<Vec<String>> {
         let corners = if deck.method.basis == Basis::Mpm { 1 } else { 1 << D };
         let of_body = |body: usize| {
             let pairs = self.pairs.iter().enumerate();
             let slips = pairs.filter(|(_, pair)| pair.body == body && pair.law.has_history());
-            slips
-                .flat_map(|(pair, _)| {
-                    (0..corners * D).map(move |k| format!("{pair}.{}.{}", k / D, k % D))
-                })
-                .collect()
+            let slips = slips.flat_map(|(pair, _)| {
+                (0..corners * D).map(move |k| format!("{pair}.{}.{}", k / D, k % D))
+            });
+            let touching = self.pairs.iter().any(|pair| pair.body == body)
+                || self.body_pairs.iter().any(|pair| pair.bodies.contains(&body));
+            let told = (self.tells && touching).then(|| told::names(D));
+            slips.chain(told.into_iter().flatten()).collect()
         };
         (0..deck.bodies.len()).map(of_body).collect()
     }
 
-    /// Where the rigid bodies are.
-    pub fn poses(&self, when: When) -> Vec<Pose<D>> {
-        self.rigids.iter().map(|rigid| rigid.motion.pose(when)).collect()
+    /// Where the rigid bodies are; those that have not come yet where they will have gone.
+    pub fn poses(&self, when: deck::When) -> Vec<Pose<D>> {
+        let pose = |rigid: &Rigid<D>| {
+            let load_factor = rigid.presence.factor(when);
+            rigid.motion.pose(When { load_factor, time: when.time, since: rigid.since })
+        };
+        self.rigids.iter().map(pose).collect()
     }
 }
 
@@ -187,7 +204,10 @@ fn rigid<const D: usize>(deck: &Deck, index: usize, rigid: &model::Rigid) -> Res
         }
     };
     let motion = Motion(rigid.motion.clone());
-    Ok(Rigid { name: rigid.name.clone(), surface, motion, free })
+    let presence = rigid.presence;
+    let before = deck.stages.iter().take(presence.from.unwrap_or(0));
+    let since = before.map(|stage| stage.duration.unwrap_or(1.0)).sum();
+    Ok(Rigid { name: rigid.name.clone(), surface, motion, free, presence, since })
 }
 
 /// `None`: the shape is not of this dimension, or has no inside.

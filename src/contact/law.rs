@@ -55,6 +55,17 @@ pub struct Response<const D: usize> {
     pub sliding: [f64; D],
 }
 
+impl<const D: usize> Response<D> {
+    /// The forces times `share`.
+    pub fn scaled(self, share: f64) -> Self {
+        Response {
+            traction: self.traction.map(|t| share * t),
+            stiffness: self.stiffness.map(|row| row.map(|k| share * k)),
+            ..self
+        }
+    }
+}
+
 impl Law {
     /// Whether the stiffness equals its transposed.
     pub fn symmetric(&self) -> bool {

@@ -23,6 +23,7 @@
 //! | velocity fields of bodies that touch each other | [`Fields`](fields::Fields) | `fields.rs` |
 //! | the plane between two bodies | [`separate`](separator::separate) | `separator.rs` |
 //! | impulses between two fields at a node | [`Meeting`](nodal::Meeting) | `nodal.rs` |
+//! | what points are told for fields `contact_*` | [`Told`](told::Told) | `told.rs` |
 //! | the rigid bodies and contacts of a deck | [`Contacts`] | `contacts.rs` |
 //!
 //! A new surface is one file that implements [`Surface`] and one line of `contacts.rs`. The forces
@@ -47,6 +48,7 @@ pub(crate) mod separator;
 pub(crate) mod solid;
 pub(crate) mod start;
 pub(crate) mod surface;
+pub(crate) mod told;
 pub(crate) mod triangles;
 
 pub use contacts::{BodyPair, Contacts, Pair};

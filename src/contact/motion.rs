@@ -21,6 +21,8 @@ pub struct When {
     pub load_factor: f64,
     /// t, s
     pub time: f64,
+    /// t when the body came, s.
+    pub since: f64,
 }
 
 /// How a rigid body is driven; without any key it is held.
@@ -46,7 +48,7 @@ impl Motion {
             *shift = total(value);
         }
         for (shift, value) in pose.shift.iter_mut().zip(&self.0.velocity) {
-            *shift += travelled(value, when.time);
+            *shift += travelled(value, when);
         }
         if let Some(turning) = &self.0.rotation {
             pose.turn = rotation(&turning.axis, total(&turning.degrees));
@@ -55,13 +57,16 @@ impl Motion {
     }
 }
 
-/// ∫ v dt from 0 to `time`, m.
-fn travelled(velocity: &Expression, time: f64) -> f64 {
+/// ∫ v dt since the body came, m.
+fn travelled(velocity: &Expression, when: When) -> f64 {
+    let time = when.time - when.since;
     if let Some(constant) = velocity.as_constant() {
         return constant * time;
     }
     let piece = time / PIECES as f64;
-    let at = |share: f64| velocity.value(&Scope { time: share * piece, ..Scope::default() });
+    let at = |share: f64| {
+        velocity.value(&Scope { time: when.since + share * piece, ..Scope::default() })
+    };
     (0..PIECES)
         .flat_map(|k| GAUSS.iter().map(move |(x, weight)| (k as f64 + x, weight)))
         .map(|(share, weight)| weight * piece * at(share))

@@ -1,9 +1,9 @@
-//! Corners near the rigid surfaces before the first step: how deep they lie, and which touch.
+//! Corners near the rigid surfaces before a step: how deep they lie, and which touch.
 
 use super::corner::DomainCorners;
-use super::motion::When;
-use super::{Contacts, Near};
+use super::{Contacts, Near, Pair};
 use crate::deck::model::Basis;
+use crate::deck::{Presence, When};
 use crate::points::Points;
 
 /// A corner at the start of the run.
@@ -17,16 +17,19 @@ pub struct Corner<const D: usize> {
     pub near: Near<D>,
 }
 
-/// Corners no further than `margin` (m) from the surface of a contact of theirs.
+/// Corners no further than `margin` (m) from the surface of a contact of theirs that `counts`, where
+/// the rigid bodies are at that moment.
 pub fn corners_within<const D: usize>(
     contacts: &Contacts<D>,
     basis: Basis,
     points: &Points<D>,
     margin: f64,
+    (when, counts): (When, impl Fn(&Presence) -> bool),
 ) -> Vec<Corner<D>> {
-    let poses = contacts.poses(When { load_factor: 0.0, time: 0.0 });
+    let poses = contacts.poses(when);
     let mut found = Vec::new();
-    for (pair, of) in contacts.pairs.iter().enumerate() {
+    let there = |(_, of): &(usize, &Pair)| counts(&of.presence);
+    for (pair, of) in contacts.pairs.iter().enumerate().filter(there) {
         let (surface, pose) = (&*contacts.rigids[of.rigid].surface, &poses[of.rigid]);
         for point in (0..points.len()).filter(|&p| points.body[p] as usize == of.body) {
             let x = &points.position[point];

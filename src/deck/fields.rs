@@ -142,6 +142,20 @@ pub const FIELDS: &[Field] = &[
     field("half_length", FieldRank::Vector, "m", "Half lengths of the point's domain"),
     field("point_force", FieldRank::Vector, "N", "Held force at full load"),
     field(
+        "contact_force",
+        FieldRank::Vector,
+        "N",
+        "Of contacts on the point's body: of rigid bodies at the corners of its domain, of other bodies its share by mass of the nodes' forces",
+    ),
+    field(
+        "contact_gap",
+        FieldRank::Scalar,
+        "m",
+        "Of the deepest place of the point that touches; negative, 0 without contact",
+    ),
+    field("contact_slip", FieldRank::Scalar, "m", "Way that it has slid in contact so far"),
+    field("contact_status", FieldRank::Scalar, "-", "0 apart, 1 sticks, 2 slides"),
+    field(
         "id",
         FieldRank::Integer,
         "-",

@@ -55,6 +55,14 @@ impl Presence {
         self.from.is_none_or(|from| from <= stage) && self.until.is_none_or(|until| stage <= until)
     }
 
+    /// Where this and another are there together; `None`: never.
+    pub fn together(&self, other: &Presence) -> Option<Presence> {
+        let from = self.from.max(other.from);
+        let until = [self.until, other.until].into_iter().flatten().min();
+        let ever = until.is_none_or(|until| from.is_none_or(|from| from <= until));
+        ever.then_some(Presence { from, until, fades: self.fades })
+    }
+
     /// There, and not on the way out.
     pub fn holds_in(&self, stage: usize) -> bool {
         self.is_in(stage) && !(self.fades && self.until == Some(stage))
@@ -104,6 +112,9 @@ mod tests {
         assert!(presence.holds_in(2) && presence.is_in(3) && !presence.holds_in(3));
         let whole = Presence { fades: false, ..presence };
         assert!(whole.holds_in(3) && whole.share(When { stage: 3, factor: 0.9, time: 0.0 }) == 1.0);
+        let later = Presence { from: Some(2), ..Presence::default() };
+        assert_eq!(presence.together(&later), Some(Presence { from: Some(2), ..presence }));
+        assert_eq!(presence.together(&Presence { from: Some(4), ..later }), None);
         assert_eq!(Presence::BEFORE.factor(When::default()), 1.0);
         assert_eq!(Presence::default().factor(When::default()), 0.0);
     }

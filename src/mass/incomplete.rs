@@ -324,6 +324,7 @@ mod tests {
         let (matrix, pattern) = system(rows, &entry);
         let diagonal: Vec<f64> = (0..rows).map(|row| entry(row, row)).collect();
         let numbering = Numbering {
+            fields: Default::default(),
             owned: rows,
             offset: 0,
             total: rows,

@@ -35,6 +35,28 @@ impl Named {
         made
     }
 
+    /// Whether these names are the same as ours but for some that `may` come and go.
+    pub fn differ_in(&self, names: &[Vec<String>], may: impl Fn(&str) -> bool) -> bool {
+        let kept = |all: &[Vec<String>]| -> Vec<Vec<String>> {
+            all.iter().map(|own| own.iter().filter(|n| !may(n)).cloned().collect()).collect()
+        };
+        let mut ours = self.names.to_vec();
+        ours.resize(names.len().max(ours.len()), Vec::new());
+        kept(&ours) == kept(names)
+    }
+
+    /// The words under other names of each body's points, whose `bodies` are those; new ones are zero.
+    pub fn renamed(&self, names: Vec<Vec<String>>, bodies: &[u32]) -> Self {
+        let mut made = Self::zeros(names, bodies.len());
+        for (p, &body) in bodies.iter().enumerate() {
+            for at in 0..made.names[body as usize].len() {
+                let value = self.get(p, body, &made.names[body as usize][at]);
+                made.of_mut(p, body)[at] = value.unwrap_or(0.0);
+            }
+        }
+        made
+    }
+
     /// Words per point.
     pub fn stride(&self) -> usize {
         self.stride

@@ -9,16 +9,24 @@ use crate::output::series::rigid_file::RigidFrame;
 use crate::output::tables::history::{ContactState, HistoryRow, Reaction};
 use crate::parallel::World;
 use crate::system::model::Model;
-use crate::system::terms::contact::Finished;
+use crate::system::terms::touching::Finished;
 
-/// The surfaces of the rigid bodies in these poses; of half spaces what crosses the grid.
-pub fn surfaces<const D: usize>(model: &Model<D>, poses: &[Pose<D>]) -> RigidFrame<D> {
+/// The surfaces of the rigid bodies that are there in a stage, in these poses; of half spaces what
+/// crosses the grid.
+pub fn surfaces<const D: usize>(
+    model: &Model<D>,
+    poses: &[Pose<D>],
+    stage: usize,
+) -> RigidFrame<D> {
     let (low, high) = model.grid.bounds();
     let middle: [f64; D] = std::array::from_fn(|a| 0.5 * (low[a] + high[a]));
     let reach: [f64; D] = std::array::from_fn(|a| 0.5 * (high[a] - low[a]));
     let mut all = Facets::default();
     let mut body = Vec::new();
     for (index, (rigid, pose)) in model.contacts.rigids.iter().zip(poses).enumerate() {
+        if !rigid.presence.is_in(stage) {
+            continue;
+        }
         let mut own = rigid.surface.facets(&pose.to_body(&middle), length(&reach));
         own.corners.iter_mut().for_each(|corner| *corner = pose.to_space(corner));
         body.extend(own.facets.iter().map(|_| index as i64));
@@ -44,8 +52,6 @@ pub struct Met {
     pub friction: f64,
     /// Lost along the normals, where bodies meet, J.
     pub impact: f64,
-    /// The node counted last.
-    pub last: Option<usize>,
 }
 
 impl Met {

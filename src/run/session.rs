@@ -24,7 +24,6 @@ use crate::petsc::log::Stages;
 use crate::petsc::{self, Session};
 use crate::petsc::{files, known};
 
-use super::start_checks::contact;
 use super::start_checks::formulas;
 use super::start_checks::support;
 use super::{aside, element_run, plan, process, setup};
@@ -39,6 +38,7 @@ use crate::record::context::Run;
 use crate::record::probes;
 use crate::record::recorder::{Closing, Ending, Opening, Recorder, Resume, restore_balance};
 use crate::record::verify;
+use crate::system::apart::require_apart;
 use crate::system::step_system;
 use crate::transfer::update;
 
@@ -216,7 +216,7 @@ impl Start<'_> {
         })?;
         let mut warnings = match resume {
             None => {
-                contact::require_apart(world, &model, &points)?;
+                require_apart(world, &model, &points, deck::When::default())?;
                 formulas::check(world, &model, &points, &active.1)?
             }
             Some(_) => Vec::new(),

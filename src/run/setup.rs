@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use crate::contact::Contacts;
+use crate::contact::told::PREFIX;
 use crate::deck::expression::Expression;
 use crate::deck::model::{self, Initial, Load};
 use crate::deck::{Deck, Presence};
@@ -140,6 +141,11 @@ pub fn restore<const D: usize>(
     let mut model = model_of(world, deck, grid, partition, materials, found, of_all)?;
     let names = model.contacts.slip_names(&model.deck);
     let slips = names.iter().any(|names| !names.is_empty());
+    if points.slip.names() != names
+        && points.slip.differ_in(&names, |name| name.starts_with(PREFIX))
+    {
+        points.slip = points.slip.renamed(names.clone(), &points.body);
+    }
     if slips && points.slip.names() != names {
         let what = "the checkpoint holds no slip of this deck's contacts: it cannot be continued";
         return Err(Error::File(what.into()));

@@ -20,9 +20,11 @@
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 //! | `supports.rs` | surfaces held by a penalty, wherever they lie on the grid |
 //! | `face_points.rs` | the cells of points on faces, where the mass decides |
+//! | `apart.rs` | no body overlaps a rigid one that comes |
 //! | `shared_nodes.rs` | where bodies in velocity fields of their own meet |
 //! | `terms/` | contributions to the equations |
 
+pub(crate) mod apart;
 pub(crate) mod border;
 pub mod conditions;
 pub(crate) mod face_points;

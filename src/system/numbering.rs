@@ -21,7 +21,7 @@ pub struct Numbering {
     /// Local index -> grid node.
     pub nodes: Vec<usize>,
     /// Whose nodes they are. Nodes of several fields lie at the same node of the grid.
-    fields: Fields,
+    pub fields: Fields,
     /// Local index -> global equation number of the node.
     pub global: Vec<Index>,
     /// Node of a field -> local index.
@@ -124,10 +124,6 @@ impl Numbering {
             self.fields = fields.clone();
         }
         self
-    }
-
-    pub fn fields(&self) -> &Fields {
-        &self.fields
     }
 
     /// Owned and ghost nodes.

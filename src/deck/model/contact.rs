@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use crate::deck::expression::Expression;
 use crate::deck::solid::Solid;
+use crate::deck::stage::Presence;
 
 /// A rigid body.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,6 +14,7 @@ pub struct Rigid {
     pub motion: RigidMotion,
     /// It moves freely.
     pub free: Option<FreeRigid>,
+    pub presence: Presence,
 }
 
 /// What moves a rigid body in place of the deck.
@@ -71,6 +73,15 @@ pub struct RigidMotion {
     pub rotation: Option<RigidRotation>,
 }
 
+impl RigidMotion {
+    /// Whether a formula of it holds s or t.
+    pub fn depends_on_time(&self) -> bool {
+        let turning = self.rotation.iter().map(|rotation| &rotation.degrees);
+        let mut all = self.displacement.iter().chain(&self.velocity).chain(turning);
+        all.any(Expression::depends_on_time)
+    }
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct RigidRotation {
     /// m; moves along with the body.
@@ -95,6 +106,7 @@ pub struct Contact {
     pub max_shear: Option<f64>,
     /// Times the body's stiffness over the cell size; not read between two bodies.
     pub penalty: f64,
+    pub presence: Presence,
 }
 
 /// What a body touches.

@@ -2,6 +2,7 @@
 
 use crate::deck::model::{Deck, Friction, Partner, RigidMotion, RigidShape};
 
+use super::problem::presence;
 use super::writer::{Writer, array, expression, expressions, inline, number, quote, vector};
 
 pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
@@ -33,6 +34,7 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
             w.line("rigid", "density", number(free.density));
             w.line("rigid", "velocity", vector(&free.velocity));
         }
+        presence(w, "rigid", rigid.presence, Some(0));
     }
     for contact in &deck.contacts {
         w.table("[[contact]]");
@@ -53,6 +55,7 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
         if let Partner::Rigid(_) = contact.partner {
             w.line("contact", "penalty", number(contact.penalty));
         }
+        presence(w, "contact", contact.presence, Some(0));
     }
 }
 

@@ -17,6 +17,12 @@ pub const SECTIONS: &[Section] = &[
                 .unit("kg/m3").range(POSITIVE).read_by(&[EXPLICIT]),
             key("velocity", Vector, Optional("zeros"), "Of a body with a density, at the start.")
                 .unit("m/s").read_by(&[EXPLICIT]),
+            key("from", Text, Optional("the first stage"),
+                "The stage it comes with, where it is in the deck then: s of its motion is that of this stage, and velocities count from its start.")
+                .read_by(&[super::LOADED]),
+            key("until", Text, Optional("it stays"),
+                "The last stage in which it is there; in quasi-static runs its forces fall to nothing over it.")
+                .read_by(&[super::LOADED]),
         ],
     },
     Section {
@@ -125,6 +131,12 @@ pub const SECTIONS: &[Section] = &[
             key("penalty", Number, Default("10.0"),
                 "On a rigid body: pressure over depth, times the body's stiffness over the cell size: a pressure p goes p h / (penalty E) deep.")
                 .range(POSITIVE),
+            key("from", Text, Optional("the first stage"),
+                "The stage it comes with. Two bodies do not slip on each other before.")
+                .read_by(&[super::LOADED]),
+            key("until", Text, Optional("it stays"),
+                "The last stage in which it is there; in quasi-static runs its forces fall to nothing over it.")
+                .read_by(&[super::LOADED]),
         ],
     },
 ];

@@ -2,16 +2,37 @@
 
 use std::path::Path;
 
-use super::shapes;
+use super::{shapes, stages};
 use crate::deck::model::{
     Analysis, AnalysisType, Boundary, Contact, FreeRigid, Friction, Mass, Method, Partner, Rigid,
     RigidMotion, RigidRotation, RigidShape,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
+use crate::deck::stage::Presence;
 use crate::deck::tree::Value;
 
 const FORMS: [&str; 8] = ["half_space", "disc", "ball", "box", "capsule", "polygon", "stl", "cone"];
+
+/// The stages that `from` and `until` may name.
+pub struct InStages<'a> {
+    pub names: &'a [String],
+    pub kind: Option<AnalysisType>,
+}
+
+impl InStages<'_> {
+    /// What goes releases its forces over its last stage, where forces are in balance.
+    fn presence(&self, table: &Table<'_>) -> Got<Presence> {
+        let fades = self.kind.is_some_and(AnalysisType::is_static);
+        let presence =
+            stages::presence(table, self.names, Presence { fades, ..Presence::default() })?;
+        if presence.from.is_none() {
+            let what = "comes with a stage: leave from out, and it is there from the first one on";
+            return Err(table.problem("from", what));
+        }
+        Ok(presence)
+    }
+}
 
 /// `directory`: where relative paths start; `boundaries`: as read, if that succeeded; their names are
 /// taken.
@@ -20,6 +41,7 @@ pub fn rigids(
     directory: &Path,
     dimension: usize,
     boundaries: Option<&[Boundary]>,
+    stages: &InStages<'_>,
 ) -> Got<Vec<Rigid>> {
     let mut names: Vec<String> =
         boundaries.unwrap_or_default().iter().map(|boundary| boundary.name.clone()).collect();
@@ -34,7 +56,9 @@ pub fn rigids(
         let motion = table.table_if("motion", |t| motion(&t, dimension));
         let (density, velocity) =
             (table.number_if("density"), table.vector_if("velocity", dimension));
+        let presence = stages.presence(&table);
         let (shape, motion, density, velocity) = (shape?, motion?, density?, velocity?);
+        let presence = presence?;
         if density.is_some() && motion.is_some() {
             let message = "a rigid body is driven by motion or moves freely with its density";
             return Err(table.problem("density", message));
@@ -55,7 +79,7 @@ pub fn rigids(
             density,
             velocity: velocity.unwrap_or_else(|| vec![0.0; dimension]),
         });
-        Ok(Rigid { name, shape, motion: motion.unwrap_or_default(), free })
+        Ok(Rigid { name, shape, motion: motion.unwrap_or_default(), free, presence })
     })
 }
 
@@ -152,13 +176,14 @@ pub fn contacts(
     rigids: Option<&[Rigid]>,
     bodies: &[String],
     (analysis, method): (Option<&Analysis>, Option<&Method>),
+    stages: &InStages<'_>,
 ) -> Got<Vec<Contact>> {
     let mut names: Vec<String> = Vec::new();
     root.tables("contact", |_, table| {
         let pair = between(&table, rigids, bodies);
         let friction = friction(&table);
         let (adhesion, most) = (table.number("adhesion"), table.number_if("max_shear"));
-        let penalty = table.number("penalty");
+        let (penalty, presence) = (table.number("penalty"), stages.presence(&table));
         let (partner, body, joined) = pair?;
         if matches!(partner, Partner::Body(_)) {
             of_two_bodies(&table, analysis, method)?;
@@ -168,7 +193,15 @@ pub fn contacts(
             return Err(table.problem("name", format!("another contact is called \"{name}\"")));
         }
         names.push(name.clone());
-        let (friction, adhesion, max_shear) = (friction?, adhesion?, most?);
+        let (friction, adhesion, max_shear, presence) = (friction?, adhesion?, most?, presence?);
+        if let (Partner::Rigid(rigid), Some(rigids)) = (partner, rigids)
+            && rigids[rigid].presence.together(&presence).is_none()
+        {
+            let name = &rigids[rigid].name;
+            let what = format!("is never there together with the rigid body \"{name}\"");
+            let help = "see from and until of both";
+            return Err(table.problem_with_help("between", what, help));
+        }
         if friction == Friction::Rough && adhesion > 0.0 {
             let message = "has no effect with friction = \"rough\", which lets nothing slip";
             return Err(table.problem("adhesion", message));
@@ -177,7 +210,8 @@ pub fn contacts(
             let message = "has no effect on a smooth surface: friction and adhesion are zero";
             return Err(table.problem("max_shear", message));
         }
-        Ok(Contact { name, partner, body, friction, adhesion, max_shear, penalty: penalty? })
+        let penalty = penalty?;
+        Ok(Contact { name, partner, body, friction, adhesion, max_shear, penalty, presence })
     })
 }
 
@@ -194,7 +228,7 @@ fn of_two_bodies(
                     leave this contact out: the bodies then meet without slip";
         return Err(table.problem_with_help("between", what, help));
     }
-    if method.is_some_and(|method| method.mass != Mass::Lumped) {
+    if analysis.is_some() && method.is_some_and(|method| method.mass != Mass::Lumped) {
         let what = "contact of two bodies takes a lumped mass: impulses at a node would move its \
                     neighbours with a consistent one";
         return Err(table.problem_with_help("between", what, "set method.mass = \"lumped\""));

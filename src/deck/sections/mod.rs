@@ -84,10 +84,11 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let names = bodies::names(&root);
     let boundaries = conditions::boundaries(&root, &earlier, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &earlier, &names, bodies.as_deref().ok());
-    let rigids = contact::rigids(&root, directory, dimension, boundaries.as_deref().ok());
+    let staging = contact::InStages { names: &stage_names, kind };
+    let rigids = contact::rigids(&root, directory, dimension, boundaries.as_deref().ok(), &staging);
     let contacts = {
         let choices = (analysis.as_ref().ok(), method.as_ref().ok());
-        contact::contacts(&root, rigids.as_deref().ok(), &names, choices)
+        contact::contacts(&root, rigids.as_deref().ok(), &names, choices, &staging)
     };
     let verify = results::verify(&root, dimension);
     let probes = probes::probes(&root, dimension, &names);
@@ -109,7 +110,9 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         }
         if let (true, Ok(bodies)) = (staged, &bodies) {
             let loads = (&loads.0[..], &loads.1[..]);
-            stages::check(&root, analysis.kind, stages, bodies, boundaries, loads)?;
+            let touching =
+                (rigids.as_deref().unwrap_or_default(), contacts.as_deref().unwrap_or_default());
+            stages::check(&root, analysis.kind, stages, bodies, boundaries, loads, touching)?;
         }
     }
     if let (Ok(analysis), Ok(materials), Ok(bodies)) = (&analysis, &materials, &bodies)

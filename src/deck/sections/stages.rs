@@ -1,6 +1,8 @@
 //! `[[stage]]`, `from` and `until`, and what stages must hold.
 
-use crate::deck::model::{Analysis, AnalysisType, Body, Boundary, Load, Place};
+use crate::deck::model::{
+    Analysis, AnalysisType, Body, Boundary, Contact, Held, Load, Place, Rigid, Support,
+};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::stage::{Presence, Stage};
@@ -143,6 +145,7 @@ pub fn check(
     bodies: &[Body],
     boundaries: &[Boundary],
     (loads, presences): (&[Load], &[Presence]),
+    (rigids, contacts): (&[Rigid], &[Contact]),
 ) -> Got<()> {
     let mut result = Ok(());
     let mut report = |section: &str, index: usize, key: &str, what: String, help: &str| {
@@ -168,6 +171,11 @@ pub fn check(
         bodies.iter().any(|body| passes(&body.presence))
             || boundaries.iter().any(driven)
             || loads.iter().zip(presences).any(moves)
+            || contacts.iter().any(|contact| passes(&contact.presence))
+            || rigids.iter().any(|rigid| {
+                passes(&rigid.presence)
+                    || rigid.presence.is_in(stage) && rigid.motion.depends_on_time()
+            })
     };
     for (index, stage) in stages.iter().enumerate() {
         let name = &stage.name;
@@ -181,8 +189,8 @@ pub fn check(
             report("stage", index, "", what, "see from and until of [[body]]");
         } else if quasi_static && index > 0 && !changes(index) {
             let what = format!(
-                "stage \"{name}\" is empty: no body, boundary or load comes with it or goes with it, \
-                 and none depends on s or t"
+                "stage \"{name}\" is empty: no body, boundary, load, rigid body or contact comes with \
+                 it or goes with it, and none depends on s or t"
             );
             let help = format!("for example a [[load]] with from = \"{name}\"");
             report("stage", index, "", what, &help);
@@ -213,8 +221,12 @@ pub fn check(
         }
     }
     for (index, boundary) in boundaries.iter().enumerate() {
-        if let Place::CellsOf { body } = boundary.place {
-            within("boundary", index, &boundary.presence, body);
+        match &boundary.place {
+            Place::CellsOf { body } => within("boundary", index, &boundary.presence, *body),
+            Place::Surface(Support { surface: Held::Surface(of), .. }) => {
+                within("boundary", index, &boundary.presence, of.body);
+            }
+            _ => {}
         }
     }
     result

@@ -8,6 +8,7 @@
 
 use nalgebra::Matrix3;
 
+use crate::contact::told;
 use crate::deck::fields::{self, FieldRank};
 use crate::error::{Error, Result};
 use crate::material::{StateVariable, state_variables};
@@ -106,6 +107,10 @@ point_field_table! {
     Mass "mass",
     HalfLength "half_length",
     PointForce "point_force",
+    ContactForce "contact_force",
+    ContactGap "contact_gap",
+    ContactSlip "contact_slip",
+    ContactStatus "contact_status",
     Id "id",
     Body "body",
     Rank "rank",
@@ -186,6 +191,7 @@ impl PointField {
             None => effective(),
             Some(_) => effective() - Matrix3::identity() * points.pore_pressure(p),
         };
+        let of_contact = |name| points.slip.get(p, points.body[p], name).unwrap_or(0.0);
         match self {
             PointField::Displacement => append_vector(&points.displacement(p), out),
             PointField::Position => append_vector(&points.position[p], out),
@@ -221,6 +227,10 @@ impl PointField {
             PointField::Jacobian => out.push(jacobian()),
             PointField::Volume => out.push(points.volume(p)),
             PointField::Mass => out.push(points.mass[p]),
+            PointField::ContactForce => out.extend(told::FORCE.map(|name| of_contact(name))),
+            PointField::ContactGap => out.push(of_contact(told::GAP)),
+            PointField::ContactSlip => out.push(of_contact(told::SLIP)),
+            PointField::ContactStatus => out.push(of_contact(told::STATUS)),
             PointField::Id => out.push(points.id[p] as f64),
             PointField::Body => out.push(f64::from(points.body[p])),
             PointField::Rank => out.push(0.0),

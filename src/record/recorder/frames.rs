@@ -48,7 +48,7 @@ impl Recorder {
         (step, time): (usize, f64),
     ) -> Result<()> {
         let Some(series) = &mut self.rigid else { return Ok(()) };
-        let frame = surfaces(model, poses);
+        let frame = surfaces(model, poses, self.stage);
         series.write(step, time, &frame, world.comm())
     }
 
@@ -74,7 +74,7 @@ impl Recorder {
         let mut nodes = Vec::new();
         let on_face: std::collections::BTreeSet<usize> = mesh.ghost_cells.iter().copied().collect();
         // A cell once for each velocity field in it.
-        let fields = mesh.numbering.fields();
+        let fields = &mesh.numbering.fields;
         for (cell, field) in mesh.populated.in_fields(fields) {
             nodes.clear();
             grid.cell_nodes(cell, &mut nodes);

@@ -7,7 +7,6 @@
 //! | does something hold every rigid motion of every piece? | `support.rs`, `pieces.rs` |
 //! | does the problem fit into the machine? | `memory.rs`, `free_memory.rs` |
 
-pub(crate) mod contact;
 mod contest;
 pub(crate) mod formulas;
 pub(crate) mod free_memory;

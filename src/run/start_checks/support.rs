@@ -7,9 +7,9 @@ use nalgebra::DMatrix;
 
 use crate::basis;
 use crate::contact::start::corners_within;
-use crate::deck::Presence;
 use crate::deck::model::{Load, Symmetry};
 use crate::deck::schema::AXES;
+use crate::deck::{Presence, When};
 use crate::error::{Error, Result};
 use crate::ghost::FaceStencil;
 use crate::parallel::{World, exchange};
@@ -62,7 +62,8 @@ pub fn require_later<const D: usize>(
             |presence: &Presence| presence.comes_in(stage) || presence.until == Some(stage);
         let bodies = deck.bodies.iter().map(|body| &body.presence);
         let boundaries = deck.boundaries.iter().map(|boundary| &boundary.presence);
-        if !bodies.chain(boundaries).any(changes) {
+        let pairs = model.contacts.pairs.iter().map(|pair| &pair.presence);
+        if !bodies.chain(boundaries).chain(pairs).any(changes) {
             continue;
         }
         let mut there = points.clone();
@@ -181,7 +182,9 @@ fn loose<const D: usize>(
     }
     let extent = (middle, length);
     add_supports(model, points, (numbering, first.stage), &pieces, extent, &mut grams)?;
-    for (piece, rows) in held_by_contact(model, points, numbering, &pieces, (&middle, length)) {
+    for (piece, rows) in
+        held_by_contact(model, points, (numbering, first), &pieces, (&middle, length))
+    {
         let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
         for row in rows {
             for (i, a) in row.iter().enumerate() {
@@ -262,14 +265,20 @@ fn add_supports<const D: usize>(
 fn held_by_contact<const D: usize>(
     model: &Model<D>,
     points: &Points<D>,
-    numbering: &Numbering,
+    (numbering, span): (&Numbering, StepSpan),
     pieces: &[u64],
     (middle, length): (&[f64; D], f64),
 ) -> Vec<(u64, Vec<Vec<f64>>)> {
     let (contacts, basis) = (&model.contacts, model.deck.method.basis);
-    let touch = TOUCH * model.grid.cell_size();
-    let touching = corners_within(contacts, basis, points, touch).into_iter();
-    let held = touching.filter_map(|corner| {
+    let (cell, stage) = (model.grid.cell_size(), span.stage);
+    // The points are where they are at the start of the run, and so is what they touch from then on.
+    // What comes with a later stage finds them somewhere near.
+    let stays = |presence: &Presence| presence.holds_in(stage) && presence.from <= Some(0);
+    let comes = |presence: &Presence| presence.holds_in(stage) && presence.from > Some(0);
+    let mut touching =
+        corners_within(contacts, basis, points, TOUCH * cell, (When::default(), stays));
+    touching.extend(corners_within(contacts, basis, points, cell, (span.start(), comes)));
+    let held = touching.into_iter().filter_map(|corner| {
         let centre = &points.position[corner.point];
         let near = model.grid.values_towards(&corner.place, centre, 0.0, None)?;
         let nodes = near.nodes.iter().take(near.count);

@@ -12,15 +12,12 @@ use std::sync::Arc;
 use crate::contact::corner::DomainCorners;
 use crate::contact::free::FreeBody;
 use crate::contact::law::{Friction, Law, Reached, Response};
-use crate::contact::motion::When;
 use crate::contact::pose::Pose;
-use crate::contact::surface::length;
 use crate::contact::{Contacts, Near, Pair};
-use crate::deck::Presence;
 use crate::deck::model::Basis;
 use crate::grid::Grid;
 use crate::grid::bins::REACH;
-use crate::points::{Points, Snapshot};
+use crate::points::Points;
 use crate::system::conditions::StepSpan;
 use crate::system::in_place::InPlace;
 use crate::system::model::Model;
@@ -31,6 +28,7 @@ use crate::tensor::Square;
 use crate::tensor::dense::dot;
 
 use super::term::{At, Health, Part, Term};
+use super::touching::{Corner, Exerted, Finished};
 
 /// Cells within which a corner may come to a surface in a step.
 const MARGIN: f64 = 2.0;
@@ -65,6 +63,8 @@ pub struct ContactTerm<const D: usize> {
     cell: f64,
     /// Of the rigid bodies at the step's start and at its end.
     poses: [Vec<Pose<D>>; 2],
+    /// Of each pair's forces that are left at both: 1, and less where it goes.
+    shares: Vec<[f64; 2]>,
     /// Those that reach nodes of other ranks come first.
     candidates: Vec<Candidate<D>>,
     reaching: usize,
@@ -87,14 +87,16 @@ impl<const D: usize> ContactTerm<D> {
         if contacts.is_empty() {
             return None;
         }
-        // Rigid bodies are there from the first stage on: s of it, then 1.
-        let span = span.seen_by(Presence::default());
-        let start = When { load_factor: span.factor_start, time: span.time_start };
-        let end = When { load_factor: span.factor_end, time: span.time_end };
+        let [start, end] = [span.start(), span.end()];
         let mut term = ContactTerm {
             contacts: Arc::clone(contacts),
             cell: model.grid.cell_size(),
             poses: [contacts.poses(start), contacts.poses(end)],
+            shares: contacts
+                .pairs
+                .iter()
+                .map(|pair| [start, end].map(|when| pair.presence.share(when)))
+                .collect(),
             candidates: Vec::new(),
             reaching: 0,
             nodes: Vec::new(),
@@ -102,11 +104,17 @@ impl<const D: usize> ContactTerm<D> {
         };
         for (rigid, body) in free.iter().enumerate() {
             let Some(body) = body else { continue };
+            if !contacts.rigids[rigid].presence.is_in(span.stage) {
+                continue;
+            }
             let mut on = body.clone();
             on.advance(&[0.0; D], &[0.0; 3], &[0.0; D], span.time_end - span.time_start);
             (term.poses[0][rigid], term.poses[1][rigid]) = (body.pose, on.pose);
         }
         for (pair, of) in contacts.pairs.iter().enumerate() {
+            if !of.presence.is_in(span.stage) {
+                continue;
+            }
             for p in (0..points.len()).filter(|&p| points.body[p] as usize == of.body) {
                 if term.may_touch(of, &points.position[p], &points.half_length[p]) {
                     term.add_corners(model, mesh, points, (pair, of), p);
@@ -161,7 +169,9 @@ impl<const D: usize> ContactTerm<D> {
             }
             // The slip that the step before has left, within what the pressure now allows.
             let reached = Reached { near, gap_before: 0.0, slip: pose.vector_to_space(&slip) };
-            let first = self.touches(&near).then(|| (near.gap, of.law.respond(&reached)));
+            let share = self.shares[pair][0];
+            let first =
+                self.touches(&near).then(|| (near.gap, of.law.respond(&reached).scaled(share)));
             let elastic = first
                 .as_ref()
                 .map_or([0.0; D], |(_, first)| pose.vector_to_body(&first.elastic_slip));
@@ -270,7 +280,7 @@ impl<const D: usize> ContactTerm<D> {
         let law = self.law(of);
         let slip = if law.has_history() { self.slip(of, x) } else { [0.0; D] };
         let reached = Reached { near, gap_before: of.gap, slip: pose.vector_to_space(&slip) };
-        Some((near.gap, law.respond(&reached)))
+        Some((near.gap, law.respond(&reached).scaled(self.shares[of.pair][1])))
     }
 
     /// Adds this rank's shares of the force at the step's start at its local nodes, N.
@@ -413,12 +423,13 @@ impl<const D: usize> ContactTerm<D> {
             done.rigids[rigid].add(&mean(shares), &x, &centre);
             let mut slip = [0.0; D];
             if let Some((gap, response)) = &last {
-                done.add_state(of, self.law(of), *gap, response);
+                let share = self.shares[of.pair][1];
+                done.add_state(self.place(of, share), self.law(of), *gap, response);
                 // All of it: the pressure that the next step begins with may allow more.
                 let whole = std::array::from_fn(|i| response.elastic_slip[i] + response.sliding[i]);
                 slip = self.poses[1][rigid].vector_to_body(&whole);
             }
-            done.keep(of, self.law(of), slip);
+            done.keep((of.point, of.slot), self.law(of), slip);
         }
         done
     }
@@ -433,15 +444,20 @@ impl<const D: usize> ContactTerm<D> {
             if let Some((gap, response)) = &of.first {
                 let force = response.traction.map(|t| of.area * t);
                 done.work += dot(&force, &self.carried(of, &x));
-                done.add_state(of, law, *gap, response);
+                done.add_state(self.place(of, self.shares[of.pair][0]), law, *gap, response);
                 slip = self.slip(of, &x);
             } else if matches!(law.friction, Friction::Coulomb { .. }) {
                 // The way so far tells the direction of friction if it touches in the next step.
                 slip = self.slip(of, &x);
             }
-            done.keep(of, law, slip);
+            done.keep((of.point, of.slot), law, slip);
         }
         done
+    }
+
+    /// A corner whose contact has `share` of its forces left.
+    fn place(&self, of: &Candidate<D>, share: f64) -> Corner {
+        Corner { pair: of.pair, point: of.point, area: of.area, share }
     }
 
     /// The way of the surface below a corner that comes to `x`, m.
@@ -487,115 +503,6 @@ impl<const D: usize> Term<D> for &ContactTerm<D> {
             for (node, weight) in self.entries(of) {
                 size[node] += weight.abs() * force;
             }
-        }
-    }
-}
-
-/// What a rigid body exerts, this rank's share.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Exerted {
-    /// N
-    pub force: [f64; 3],
-    /// Sum of the sizes of the forces on the corners, N.
-    pub sum_abs: f64,
-    /// About [`Rigid::torque_centre`](crate::contact::Rigid::torque_centre), N m; in 2D along z.
-    pub torque: [f64; 3],
-}
-
-impl Exerted {
-    fn add<const D: usize>(&mut self, force: &[f64; D], x: &[f64; D], centre: &[f64; D]) {
-        for (sum, f) in self.force.iter_mut().zip(force) {
-            *sum += f;
-        }
-        self.sum_abs += force.iter().map(|f| f * f).sum::<f64>().sqrt();
-        let (mut arm, mut f) = ([0.0; 3], [0.0; 3]);
-        for a in 0..D {
-            (arm[a], f[a]) = (x[a] - centre[a], force[a]);
-        }
-        for (k, torque) in self.torque.iter_mut().enumerate() {
-            let (i, j) = ((k + 1) % 3, (k + 2) % 3);
-            *torque += arm[i] * f[j] - arm[j] * f[i];
-        }
-    }
-}
-
-/// A contact at the end of a step, this rank's share.
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Touching {
-    /// Index into the deck's contacts.
-    pub index: usize,
-    /// m2 (m in 2D)
-    pub area: f64,
-    /// Σ A times the slip of the step, m3 (m2 in 2D).
-    pub slid: f64,
-    /// Of the deepest corner, m.
-    pub depth: f64,
-}
-
-impl Touching {
-    fn of(index: usize) -> Self {
-        Touching { index, ..Touching::default() }
-    }
-}
-
-/// What a step of contact leaves, this rank's share.
-#[derive(Debug)]
-pub struct Finished<const D: usize> {
-    /// Of each rigid body.
-    pub rigids: Vec<Exerted>,
-    /// Of each contact.
-    pub pairs: Vec<Touching>,
-    /// In penalties, J.
-    pub energy: f64,
-    /// Of friction in the step, J.
-    pub dissipation: f64,
-    /// Of the rigid bodies on the others in the step, J.
-    pub work: f64,
-    /// Point, first word, elastic slip in the rigid body's frame.
-    slips: Vec<(usize, usize, [f64; D])>,
-}
-
-impl<const D: usize> Finished<D> {
-    fn new(contacts: &Contacts<D>) -> Self {
-        Finished {
-            rigids: vec![Exerted::default(); contacts.rigids.len()],
-            pairs: contacts.pairs.iter().map(|pair| Touching::of(pair.index)).collect(),
-            energy: 0.0,
-            dissipation: 0.0,
-            work: 0.0,
-            slips: Vec::new(),
-        }
-    }
-
-    /// Adds what a corner that touches holds and loses.
-    fn add_state(&mut self, of: &Candidate<D>, law: Law, gap: f64, response: &Response<D>) {
-        let slid = length(&response.sliding);
-        let held = length(&response.elastic_slip);
-        let state = &mut self.pairs[of.pair];
-        state.area += of.area;
-        state.slid += of.area * slid;
-        state.depth = state.depth.max(-gap);
-        self.energy += 0.5 * law.penalty * of.area * (gap * gap + held * held);
-        self.dissipation += law.penalty * of.area * held * slid;
-    }
-
-    fn keep(&mut self, of: &Candidate<D>, law: Law, slip: [f64; D]) {
-        if law.has_history() {
-            self.slips.push((of.point, of.slot, slip));
-        }
-    }
-
-    /// Gives the points the elastic slip of the step's end; what it overwrites is kept in `before`.
-    pub fn keep_slip(&self, points: &mut Points<D>, before: Option<&mut Snapshot<D>>) {
-        if points.slip.stride() == 0 {
-            return;
-        }
-        if let Some(before) = before {
-            before.slip.copy(&points.slip.values);
-        }
-        for (p, slot, slip) in &self.slips {
-            let body = points.body[*p];
-            points.slip.of_mut(*p, body)[*slot..*slot + D].copy_from_slice(slip);
         }
     }
 }

@@ -26,5 +26,6 @@ mod scalar;
 pub mod stress;
 pub mod surface;
 pub mod term;
+pub mod touching;
 
 pub use term::Term;

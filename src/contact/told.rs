@@ -1,0 +1,82 @@
+//! What contact does to points, for the fields `contact_*`: words behind the elastic slip of a point.
+
+use super::Contacts;
+use crate::deck::Deck;
+use crate::points::Points;
+
+/// Begin of the names of all of these fields.
+pub const PREFIX: &str = "contact_";
+pub const FORCE: [&str; 3] = ["contact_force.x", "contact_force.y", "contact_force.z"];
+pub const GAP: &str = "contact_gap";
+pub const SLIP: &str = "contact_slip";
+pub const STATUS: &str = "contact_status";
+
+/// Words behind the components of the force.
+const OTHERS: [&str; 3] = [GAP, SLIP, STATUS];
+
+/// Values of [`STATUS`]; without contact it is zero.
+pub const STICKS: f64 = 1.0;
+pub const SLIDES: f64 = 2.0;
+
+/// What one corner or one node tells a point of a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Told<const D: usize> {
+    pub point: usize,
+    /// On the point's body, N.
+    pub force: [f64; D],
+    /// m
+    pub gap: f64,
+    /// Way that it has slid in the step, m.
+    pub slid: f64,
+    pub status: f64,
+}
+
+/// Whether the deck asks for any of these fields.
+pub fn is_wanted(deck: &Deck) -> bool {
+    let probed = deck.probes.iter().flat_map(|probe| &probe.fields);
+    let verified = deck.verify.iter().map(|verify| &verify.field);
+    let mut all = deck.output.fields.iter().chain(probed).chain(verified);
+    all.any(|name| name.starts_with(PREFIX))
+}
+
+/// Names of the words of a point.
+pub fn names(dimension: usize) -> impl Iterator<Item = String> {
+    FORCE[..dimension].iter().chain(&OTHERS).map(|name| name.to_string())
+}
+
+/// Gives the points of bodies in contact what they have been told; forces of one point add up, of
+/// gaps the smallest counts, and slip goes on from step to step.
+pub fn tell<const D: usize>(
+    contacts: &Contacts<D>,
+    points: &mut Points<D>,
+    told: impl Iterator<Item = Told<D>>,
+) {
+    if !contacts.tells {
+        return;
+    }
+    let words = D + OTHERS.len();
+    for p in 0..points.len() {
+        let body = points.body[p];
+        let row = points.slip.of_mut(p, body);
+        if !row.is_empty() {
+            let own = row.len() - words;
+            row[own..own + D + 1].fill(0.0);
+            row[own + words - 1] = 0.0;
+        }
+    }
+    let mut slid = vec![0.0f64; points.len()];
+    for one in told {
+        let body = points.body[one.point];
+        let row = points.slip.of_mut(one.point, body);
+        let Some(own) = row.len().checked_sub(words) else { continue };
+        let row = &mut row[own..];
+        for (sum, force) in row.iter_mut().zip(&one.force) {
+            *sum += force;
+        }
+        row[D] = row[D].min(one.gap);
+        let before = slid[one.point];
+        slid[one.point] = before.max(one.slid);
+        row[D + 1] += slid[one.point] - before;
+        row[D + 2] = row[D + 2].max(one.status);
+    }
+}
