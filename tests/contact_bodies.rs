@@ -253,7 +253,7 @@ fn bodies_without_a_contact_are_joined() {
     let text = std::fs::read_to_string(input("sliding-block")).expect("a deck");
     let text = text.replace("velocity = [0.5, 0.0]\n", "").replacen("[[contact]]", third, 1);
     let text = text.replace("[\"ground\", \"block\"]", "[\"far\", \"ground\"]");
-    let text = text.replace("duration = 0.5", "duration = 0.1");
+    let text = text.replace("duration = 0.5\ncfl = 0.5", "duration = 0.1\nsteps = 100");
     let shift = |results: &Results| {
         let step = results.history("step").len();
         let points = results.points(step);

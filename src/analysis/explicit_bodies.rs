@@ -82,8 +82,9 @@ pub(super) fn meet<const D: usize>(
     Ok((met, told))
 }
 
-/// Words of a node behind the components of its force over its mass: gap, way slid, status.
-const OTHERS: usize = 3;
+/// Words of a node behind the components of its force over its mass: gap, way slid times its share of the
+/// surface, status, and that share.
+const OTHERS: usize = 4;
 
 /// What nodes in contact tell the points that they move: of the force at a node each takes the share of
 /// its mass. Collective.
@@ -99,15 +100,26 @@ fn told<const D: usize>(
     let step = mesh.step_points(points, &model.materials);
     let mut told = Vec::new();
     for point in 0..points.len() {
+        let mut one = Told { point, force: [0.0; D], gap: 0.0, slid: 0.0, status: 0.0 };
+        let (mut slid, mut area) = (0.0, 0.0);
         for (&node, entry) in step.nodes_of(point).iter().zip(step.influences.row(point)) {
             let words = &at_nodes[node as usize * width..][..width];
             let weight = step.influences.weights[entry];
             if words[D + 2] == 0.0 || weight <= 0.0 {
                 continue;
             }
-            let force = std::array::from_fn(|i| points.mass[point] * weight * words[i]);
-            let (gap, slid, status) = (words[D], words[D + 1], words[D + 2]);
-            told.push(Told { point, force, gap, slid, status });
+            for (force, word) in one.force.iter_mut().zip(words) {
+                *force += points.mass[point] * weight * word;
+            }
+            one.gap = one.gap.min(words[D]);
+            one.status = one.status.max(words[D + 2]);
+            slid += weight * words[D + 1];
+            area += weight * words[D + 3];
+        }
+        if one.status > 0.0 {
+            // A node that one body hardly reaches moves at will, and has no share of the surface.
+            one.slid = if area > 0.0 { slid / area } else { 0.0 };
+            told.push(one);
         }
     }
     Ok(told)
@@ -191,8 +203,12 @@ impl<'a, const D: usize> Here<'a, D> {
                 class.impulse[i] += sign * impulse[i];
                 class.velocity[i] += sign * class.compliance[i] * impulse[i];
             }
-            let [gap, slid, before] = class.state.unwrap_or_default();
-            class.state = Some([gap.min(meeting.gap), slid.max(slip), before.max(status)]);
+            let [gap, slid, before, area] = class.state.unwrap_or_default();
+            let (slid, area) = match counts {
+                true => (slid + meeting.area * slip, area + meeting.area),
+                false => (slid, area),
+            };
+            class.state = Some([gap.min(meeting.gap), slid, before.max(status), area]);
         }
         let met = &mut met[*pair];
         for (force, j) in met.force.iter_mut().zip(impulse) {

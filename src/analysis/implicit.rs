@@ -25,6 +25,8 @@ use crate::transfer::update;
 
 use super::equilibrium::StepEquations;
 use super::external::{Loads, add};
+use super::free_bodies::FreeBodies;
+use super::free_motion::FreeMotion;
 use super::inertial::{Dynamics, InertialStep};
 use super::load_steps::Stepping;
 use super::newton::{self, Carried};
@@ -38,6 +40,7 @@ pub struct Implicit<const D: usize> {
     /// Of the quasi-static analysis.
     totals: Totals,
     contact: ContactTotals,
+    free: FreeBodies<D>,
     /// `None` without inertia.
     dynamics: Option<Dynamics<D>>,
 }
@@ -53,6 +56,7 @@ impl<const D: usize> Implicit<D> {
             trials: Trials::default(),
             totals: Totals::default(),
             contact: ContactTotals::new(run.model.deck.contacts.len()),
+            free: FreeBodies::new(&run.model),
             dynamics: dynamic.then(|| Dynamics::new(run)),
         }
     }
@@ -67,6 +71,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         self.stepping.restore(state)?;
         self.trials.restore(state);
         self.contact.restore(state)?;
+        self.free.restore(state)?;
         match &mut self.dynamics {
             Some(dynamics) => dynamics.restore(state),
             None => self.totals.restore(state),
@@ -78,6 +83,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         self.stepping.save(&mut state);
         self.trials.save(&mut state);
         self.contact.save(&mut state);
+        self.free.save(&mut state);
         match &self.dynamics {
             Some(dynamics) => dynamics.save(&mut state),
             None => self.totals.save(&mut state),
@@ -104,8 +110,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             loads.release(world, model, points, (&mesh, &conditions), span)?;
             Ok((loads, mesh.nodes_left_out(world, model.deck.method.drop_below)))
         })?;
-        let contact = clock
-            .time(Phase::Assemble, || Ok(ContactTerm::new(model, &mesh, points, span, &[])))?;
+        let free = &self.free;
+        let mut contact = clock
+            .time(Phase::Assemble, || Ok(ContactTerm::new(model, &mesh, points, span, &free.0)))?;
         if let (Some(contact), Some(_)) = (&contact, &self.dynamics) {
             loads.nodes_start.resize(mesh.numbering.len() * D, 0.0);
             contact.add_force_at_start(&mut loads.nodes_start);
@@ -117,26 +124,47 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             }
             None => None,
         };
-        let Run { clock, .. } = &mut *run;
-        let (mut driving, inertia) = clock.time(Phase::Assemble, || {
-            Ok(match &inertial {
-                Some(inertial) => inertial.equations(&mesh, &loads),
-                None => (loads.external_end.clone(), Vec::new()),
-            })
-        })?;
         let (conditions, left_out) = (&conditions, &left_out[..]);
         let share = 1.0 + run.model.deck.analysis.hht_alpha;
-        let mut terms: Vec<Box<dyn Term<D> + '_>> = Vec::new();
-        if let Some(contact) = &contact {
-            terms.push(Box::new(contact));
-        }
-        // Inertia scales what stands before it.
-        for term in inertia {
-            terms.push(term);
-        }
-        let equations =
-            StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
-        let solved = newton::solve(run, &mesh, equations, &mut self.trials, next)?;
+        let shares = inertial.as_ref().map_or([0.0, 1.0], |inertial| inertial.shares());
+        let mut moving = contact.as_ref().and_then(|contact| {
+            FreeMotion::begin(run.world, &run.model, &self.free, contact, (span, shares[1]))
+        });
+        let (mut evaluations, mut linear_iterations) = (0, 0);
+        // Once, or until free rigid bodies are where the forces of their contacts take them.
+        let (mut driving, solved) = loop {
+            if let (Some(moving), Some(contact)) = (&moving, &mut contact) {
+                moving.place(contact);
+            }
+            let Run { clock, .. } = &mut *run;
+            let (driving, inertia) = clock.time(Phase::Assemble, || {
+                Ok(match &inertial {
+                    Some(inertial) => inertial.equations(&mesh, &loads),
+                    None => (loads.external_end.clone(), Vec::new()),
+                })
+            })?;
+            let mut terms: Vec<Box<dyn Term<D> + '_>> = Vec::new();
+            if let Some(contact) = &contact {
+                terms.push(Box::new(contact));
+            }
+            // Inertia scales what stands before it.
+            for term in inertia {
+                terms.push(term);
+            }
+            let equations =
+                StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
+            let solved = newton::solve(run, &mesh, equations, &mut self.trials, next)?;
+            evaluations += solved.evaluations;
+            linear_iterations += solved.linear_iterations;
+            let (Some(moving), Some(contact)) = (&mut moving, &contact) else {
+                break (driving, solved);
+            };
+            match moving.settle(run.world, contact, &solved.displacement, shares) {
+                Ok(true) => break (driving, solved),
+                Ok(false) => {}
+                Err(what) => return Err(Refusal { cause: Cause::NotConverged, what }.into()),
+            }
+        };
         add(&mut loads.external_end, 1.0, &solved.following);
         add(&mut driving, share, &solved.following);
         let displacement = solved.displacement;
@@ -158,10 +186,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             Some(inertial) => inertial.supplied(model, &mesh, out_of_balance),
             None => (out_of_balance, [solved.internal_start, solved.internal]),
         };
-        let touching = contact.map(|contact| {
-            let shares = inertial.as_ref().map_or([0.0, 1.0], |inertial| inertial.shares());
-            contact.finish(&displacement, shares)
-        });
+        let touching = contact.map(|contact| contact.finish(&displacement, shares));
         let external = [&loads.external_start[..], &loads.external_end];
         let mut work = work_of_step::<D>(
             conditions,
@@ -194,9 +219,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             step: number,
             stage: span.stage,
             load_factor: span.factor_end,
-            newton_iterations: solved.evaluations,
+            newton_iterations: evaluations,
             residual: solved.residual,
-            linear_iterations: solved.linear_iterations,
+            linear_iterations,
             reactions: with_supports(
                 world,
                 &borne,
@@ -230,7 +255,11 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             }
         }
         row.cuts = self.stepping.cuts;
-        let poses = run.model.contacts.poses(span.end());
+        if let Some(moving) = &moving {
+            moving.finish(&mut self.free);
+        }
+        row.free = self.free.states();
+        let poses = self.free.poses(&run.model, span);
         Ok(Solved { row, mesh, displacement, reaction, moved_grid, poses })
     }
 

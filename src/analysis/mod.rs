@@ -9,6 +9,8 @@
 //! | `strength-reduction` | `strength_reduction.rs` | Griffiths, Lane 1999 |
 //! | `conditioning` | `conditioning.rs`, `extremes.rs` | Ghost §2.6, 3.5, 5.1.1 |
 //! | `element-test` | `element_test.rs` | one point, no grid |
+//! | contact in explicit steps | `explicit_contact.rs`, `explicit_bodies.rs` | formulations.md B.5 |
+//! | rigid bodies that move freely | `free_bodies.rs`; in implicit steps `free_motion.rs` | Broyden 1965 |
 //! | what comes and goes with a stage | `stage_changes.rs`, `release.rs` | |
 //! | damping of dynamics | `damping.rs` | Cundall 1987 |
 //! | load steps, cut and grown again | `load_steps.rs` | |
@@ -32,6 +34,8 @@ pub(crate) mod explicit_step;
 mod external;
 pub(crate) mod extremes;
 pub(crate) mod failure;
+mod free_bodies;
+mod free_motion;
 pub(crate) mod implicit;
 mod inertial;
 pub(crate) mod load_steps;

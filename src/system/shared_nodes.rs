@@ -23,6 +23,9 @@ use crate::tensor::dense::dot;
 /// How far from a node, along an axis in cells, points are seen that do not reach it.
 const BEYOND: f64 = 1.75;
 
+/// Distances of two pairs, over themselves, that are alike.
+const ALIKE: f64 = 1e-6;
+
 /// A node of the grid that several fields reach.
 #[derive(Debug)]
 pub struct SharedNode<const D: usize> {
@@ -199,13 +202,16 @@ fn meeting<const D: usize>(sides: &[Vec<&Seen<D>>; 2], size: f64) -> Option<Meet
         Some((low - high, n))
     };
     let normal = match (apart(&near[0], &all[1]), apart(&all[0], &near[1])) {
-        (Some(one), Some(two)) => {
-            if one.0 <= two.0 {
-                one.1
-            } else {
-                two.1
+        // Of two that are equally near up to round-off the mean: neither body is the first.
+        (Some(one), Some(two)) => match (one.0 - two.0) / one.0.max(two.0) {
+            more if more > ALIKE => two.1,
+            more if more < -ALIKE => one.1,
+            _ => {
+                let sum: [f64; D] = std::array::from_fn(|i| one.1[i] + two.1[i]);
+                let size = length(&sum);
+                sum.map(|n| n / size)
             }
-        }
+        },
         // In an inner corner no plane has one body on either side.
         _ => apart(&near[0], &near[1]).map(|(_, n)| n).or_else(|| between_means(&near))?,
     };

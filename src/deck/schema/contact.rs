@@ -2,21 +2,21 @@
 
 use super::Kind::{Expression, Expressions, Number, Points, Special, Table, Text, Vector};
 use super::Need::{Default, Optional, Required};
-use super::{DYNAMIC, EXPLICIT, POSITIVE, Section, at_least, between, key};
+use super::{DYNAMIC, POSITIVE, Section, at_least, between, key};
 
 pub const SECTIONS: &[Section] = &[
     Section {
         name: "rigid",
         header: "[[rigid]]",
-        doc: "A body that does not deform: held, driven by `motion`, or, with a density in explicit runs, moved by its weight and the bodies that touch it (history.csv has `rigid.NAME.*`: its centre of mass, velocity, spin and energy). It acts on the bodies that a `[[contact]]` names with it.",
+        doc: "A body that does not deform: held, driven by `motion`, or, with a density in dynamic runs, moved by its weight and the bodies that touch it (history.csv has `rigid.NAME.*`: its centre of mass, velocity, spin and energy). It acts on the bodies that a `[[contact]]` names with it.",
         keys: &[
             key("name", Text, Required, "Names the reaction columns: what it exerts on the bodies, and the torque about the centre of its rotation or the origin. Unique among boundaries and rigid bodies."),
             key("shape", Table("rigid.shape"), Required, "Its surface."),
             key("motion", Table("rigid.motion"), Optional("held"), "How it is driven."),
             key("density", Number, Optional("held or driven"), "It moves freely: in place of `motion`. Not of a half space.")
-                .unit("kg/m3").range(POSITIVE).read_by(&[EXPLICIT]),
+                .unit("kg/m3").range(POSITIVE).read_by(&[DYNAMIC]),
             key("velocity", Vector, Optional("zeros"), "Of a body with a density, at the start.")
-                .unit("m/s").read_by(&[EXPLICIT]),
+                .unit("m/s").read_by(&[DYNAMIC]),
             key("from", Text, Optional("the first stage"),
                 "The stage it comes with, where it is in the deck then: s of its motion is that of this stage, and velocities count from its start.")
                 .read_by(&[super::LOADED]),

@@ -397,6 +397,22 @@ impl<const D: usize> ContactTerm<D> {
         all
     }
 
+    /// Calls `visit` with the rigid body, the place and A times the stiffness of every corner that
+    /// touches after the nodal increments `displacement`.
+    pub fn each_stiffness(
+        &self,
+        displacement: &[f64],
+        mut visit: impl FnMut(usize, [f64; D], Square<D>),
+    ) {
+        for of in &self.candidates {
+            let x = self.position(of, displacement);
+            if let Some((_, response)) = self.respond(of, &x) {
+                let stiffness = response.stiffness.map(|row| row.map(|k| of.area * k));
+                visit(self.contacts.pairs[of.pair].rigid, x, stiffness);
+            }
+        }
+    }
+
     /// Where a rigid body is at the step's end.
     pub fn set_end(&mut self, rigid: usize, pose: Pose<D>) {
         self.poses[1][rigid] = pose;
