@@ -181,9 +181,13 @@ fn points_tell_what_bodies_in_contact_do_to_them() {
     }
     let status = points.field("contact_status");
     assert!(status.contains(&0.0) && status.contains(&2.0));
-    let slid = points.field("contact_slip").iter().fold(0.0f64, |m, v| m.max(*v));
-    let mean = last(&one, "contact.ground-block.slip");
-    assert!((slid / mean - 1.0).abs() < 0.05, "{slid} {mean}");
+    // Points of the block that bear much have slid as the block has.
+    let (slid, down) = (points.field("contact_slip"), points.component("contact_force", 1));
+    let bearing = slid.iter().zip(&down).filter(|(_, force)| **force > 100.0);
+    let slid: Vec<f64> = bearing.map(|(slid, _)| *slid).collect();
+    let (slid, mean) =
+        (slid.iter().sum::<f64>() / slid.len() as f64, last(&one, "contact.ground-block.slip"));
+    assert!((slid / mean - 1.0).abs() < 0.1, "{slid} {mean}");
     let more = deck.clone().ranks(2).results();
     for field in ["contact_force", "contact_gap", "contact_slip", "contact_status"] {
         let wrong = relative_difference(more.points(step).field(field), points.field(field));
@@ -248,7 +252,7 @@ adhesion = 10.0
 #[test]
 fn bodies_without_a_contact_are_joined() {
     let third = "[[body]]\nname = \"far\"\nmaterial = \"rubber\"\ndensity = 1000.0\n\
-                 shape = { box = { min = [1.25, 0.5], max = [1.5, 0.75] } }\n\n[[contact]]\n\
+                 shape = { box = { min = [1.75, 0.75], max = [2.0, 1.0] } }\n\n[[contact]]\n\
                  between = [\"far\", \"block\"]\n\n[[contact]]";
     let text = std::fs::read_to_string(input("sliding-block")).expect("a deck");
     let text = text.replace("velocity = [0.5, 0.0]\n", "").replacen("[[contact]]", third, 1);
@@ -263,12 +267,12 @@ fn bodies_without_a_contact_are_joined() {
         own.iter().sum::<f64>() / own.len() as f64
     };
     let joined = shift(&Run::text(&text).set("verify=").results());
-    let alone = text.split("[[contact]]").next().expect("text").to_string()
-        + "[[load]]"
-        + text.split("[[load]]").nth(1).expect("a load");
+    let (bodies, rest) = text.split_once("[[contact]]").expect("a contact");
+    let loads = rest.split_once("[[load]]").expect("a load").1;
+    let alone = format!("{bodies}[[load]]{loads}");
     let native = shift(&Run::text(&alone).set("verify=").results());
     // Its slip would be 0.0118 m.
-    assert!(native.abs() < 2e-3 && (joined / native - 1.0).abs() < 1e-6, "{joined} {native}");
+    assert!(native.abs() < 2e-3 && (joined / native - 1.0).abs() < 1e-9, "{joined} {native}");
 }
 
 #[test]

@@ -15,6 +15,13 @@ fn impulse(results: &Results, column: &str) -> f64 {
     results.history(column).iter().zip(&steps).map(|(force, dt)| force * dt).sum()
 }
 
+/// What a body's speed along x has gained since a time, m/s.
+fn gained(results: &Results, body: &str, since: f64) -> f64 {
+    let speed = results.history(&format!("rigid.{body}.velocity_x"));
+    let before = results.history("time").iter().filter(|t| **t < since + 1e-6).count();
+    speed.last().expect("a row") - speed[before - 1]
+}
+
 /// A rigid disc falls on a pad of rubber.
 const DROPPED: &str = r#"
 [analysis]
@@ -57,10 +64,10 @@ checkpoint = { every = 20, keep = 10 }
 "#;
 
 /// What it pushes with is what changes its momenta, to round-off; with the pad it keeps the energy but
-/// for what friction takes.
+/// for what friction takes, and the pad's Ghost mass (1.3, 1.0, 0.8 % in 100, 200, 400 steps).
 #[test]
 fn a_rigid_disc_bounces_off_a_pad() {
-    let results = Run::text(DROPPED).results();
+    let results = Run::text(&DROPPED.replace("steps = 100", "steps = 400")).results();
     let mass = 1000.0 * std::f64::consts::PI * 0.25;
     for (axis, start) in [("x", 0.3), ("y", -1.0)] {
         let gained = mass * (last(&results, &format!("rigid.disc.velocity_{axis}")) - start);
@@ -86,7 +93,9 @@ fn a_rigid_disc_bounces_off_a_pad() {
 
 #[test]
 fn ranks_agree_on_a_free_body_and_a_restart_repeats_it() {
-    let run = Run::text(DROPPED).set("parallel.brick=1").set("analysis={ type = \"implicit-dynamic\", duration = 0.1, steps = 40, max_iterations = 30 }");
+    let run = Run::text(DROPPED).set("parallel.brick=1").set(
+        "analysis={ type = \"implicit-dynamic\", duration = 0.1, steps = 40, max_iterations = 30 }",
+    );
     let one = run.results();
     for ranks in [2, 3] {
         let more = run.clone().ranks(ranks).results();
@@ -97,7 +106,8 @@ fn ranks_agree_on_a_free_body_and_a_restart_repeats_it() {
     }
     let folder = tempfile::tempdir().expect("a scratch folder");
     let deck = folder.path().join("deck.toml");
-    std::fs::write(&deck, DROPPED.replace("steps = 100", "steps = 40").replace("0.25", "0.1")).unwrap();
+    std::fs::write(&deck, DROPPED.replace("steps = 100", "steps = 40").replace("0.25", "0.1"))
+        .unwrap();
     for ranks in [1, 2] {
         let at = |name: &str| folder.path().join(format!("{name}-{ranks}"));
         program::run_well(ranks, &deck, &at("whole"), &[]);
@@ -114,18 +124,16 @@ fn a_free_disc_rolls_in_implicit_steps() {
         .replace("velocity = [0.3, -1.0]\n", "")
         .replace("centre = [0.1, 0.51], radius = 0.5", "centre = [-0.4, 0.5], radius = 0.5")
         .replace("friction = 0.3", "friction = 0.6")
-        .replace("duration = 0.25\nsteps = 100", "duration = 0.8\nsteps = 80")
+        .replace("duration = 0.25\nsteps = 100", "duration = 0.8\nsteps = 80\non_failure = \"cut\"")
         .replace("young = 1e6", "young = 4e6");
-    let text = format!(
-        "{text}\n[[load]]\ngravity = [\"if(t>0.4, 3.3552, 0)\", \"-9.2184*min(1,3*t)\"]\n"
-    );
+    let text =
+        format!("{text}\n[[load]]\ngravity = [\"if(t>0.4, 3.3552, 0)\", \"-9.2184*min(1,3*t)\"]\n");
     let results = Run::text(&text).results();
-    let (time, x) = (results.history("time"), results.history("rigid.disc.x"));
-    let rolled = x.last().expect("a row") - x[time.iter().filter(|t| **t < 0.4001).count() - 1];
-    let expected = 0.5 * 2.2368 * 0.16;
-    assert!((rolled / expected - 1.0).abs() < 0.02, "{rolled} {expected}");
+    let gained = gained(&results, "disc", 0.4);
+    assert!((gained / (2.2368 * 0.4) - 1.0).abs() < 0.03, "{gained}");
     // Without slip: the spin is the speed over the radius.
-    let (speed, spin) = (last(&results, "rigid.disc.velocity_x"), last(&results, "rigid.disc.spin_z"));
+    let (speed, spin) =
+        (last(&results, "rigid.disc.velocity_x"), last(&results, "rigid.disc.spin_z"));
     assert!((-0.5 * spin / speed - 1.0).abs() < 0.03, "{speed} {spin}");
 }
 
@@ -138,6 +146,7 @@ fn a_free_ball_rolls_in_implicit_steps() {
 type = "implicit-dynamic"
 duration = 0.6
 steps = 60
+on_failure = "cut"
 max_iterations = 30
 [method]
 basis = "gimp"
@@ -173,10 +182,8 @@ gravity = ["if(t>0.3, 3.3552, 0)", 0.0, "-9.2184*min(1,4*t)"]
 every = 60
 "#;
     let results = Run::text(text).results();
-    let (time, x) = (results.history("time"), results.history("rigid.ball.x"));
-    let rolled = x.last().expect("a row") - x[time.iter().filter(|t| **t < 0.3001).count() - 1];
-    let expected = 0.5 * 5.0 / 7.0 * 3.3552 * 0.09;
-    assert!((rolled / expected - 1.0).abs() < 0.03, "{rolled} {expected}");
+    let gained = gained(&results, "ball", 0.3);
+    assert!((gained / (5.0 / 7.0 * 3.3552 * 0.3) - 1.0).abs() < 0.03, "{gained}");
 }
 
 /// A disc of rubber bounces off a held floor: its momentum changes by the impulse to round-off, and the

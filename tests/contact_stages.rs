@@ -71,11 +71,12 @@ fn a_rigid_body_that_comes_later_does_what_it_does_at_once() {
     let at_once = Run::text(&STAGED.replace(stage, "")).results();
     let (late, soon) = (later.history("reaction.plate.y"), at_once.history("reaction.plate.y"));
     assert!(late[..4].iter().all(|force| *force == 0.0), "{late:?}");
-    assert!(relative_difference(&late[4..], &soon) < 1e-10, "{late:?} {soon:?}");
-    // A contact that comes where the plate has gone on to already is told.
+    // Without a load the first stage leaves the block as it is.
+    assert!(relative_difference(&late[4..], &soon) < 1e-9, "{late:?} {soon:?}");
+    // A contact that comes where the plate has gone to already is told, once the run is there.
     let outcome = Run::text(STAGED).set("contact.1.from=\"second\"").attempt();
     let said = outcome.said();
-    assert_eq!(outcome.code, 2, "{said}");
+    assert_eq!(outcome.code, 1, "{said}");
     for part in ["overlaps the rigid body \"plate\" by 6.000e-2 m", "stage \"second\" begins"] {
         assert!(said.contains(part), "{said}");
     }
@@ -153,10 +154,9 @@ fn bodies_slip_while_their_contact_is_there() {
                   duration = 0.1\n\n[method]";
     let text = text.replace("duration = 0.5\n", "").replace("\n[method]", stages);
     let text = text.split("[[verify]]").next().expect("text").to_string();
-    let results =
-        Run::text(&text.replace("friction = 0.3", "friction = 0.3\nuntil = \"slide\""))
-            .set("output.fields=[\"displacement\",\"position_initial\"]")
-            .results();
+    let results = Run::text(&text.replace("friction = 0.3", "friction = 0.3\nuntil = \"slide\""))
+        .set("output.fields=[\"displacement\",\"position_initial\"]")
+        .results();
     let (slip, stage) = (results.history("contact.ground-block.slip"), results.history("stage"));
     let begun = stage.iter().position(|stage| *stage == 2.0).expect("a second stage");
     assert!(slip[begun - 1] > 0.04, "{slip:?}");
@@ -177,8 +177,7 @@ fn points_tell_what_rigid_bodies_do_to_them() {
                   \"contact_status\"]\n";
     let once = STAGED.replace("[[stage]]\nname = \"second\"\nsteps = 4\n", "");
     let run = Run::text(&format!("{once}{fields}"))
-        .set("rigid.1.motion.displacement=[\"0.1*s\",\"-0.06*s\"]")
-        .set("contact.1.friction=0.5");
+        .set("rigid.1.motion.displacement=[\"0.1*s\",\"-0.06*s\"]");
     let results = run.results();
     let points = results.points(4);
     for (axis, name) in ["x", "y"].iter().enumerate() {

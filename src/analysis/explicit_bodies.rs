@@ -86,6 +86,9 @@ pub(super) fn meet<const D: usize>(
 /// surface, status, and that share.
 const OTHERS: usize = 4;
 
+/// Share of the surface in a cell's side up to which a point is not said to be in contact.
+const HARDLY: f64 = 0.01;
+
 /// What nodes in contact tell the points that they move: of the force at a node each takes the share of
 /// its mass. Collective.
 fn told<const D: usize>(
@@ -98,6 +101,7 @@ fn told<const D: usize>(
     let width = D + OTHERS;
     mesh.numbering.halo.forward(world, &mut at_nodes, width)?;
     let step = mesh.step_points(points, &model.materials);
+    let least = HARDLY * model.grid.cell_size().powi(D as i32 - 1);
     let mut told = Vec::new();
     for point in 0..points.len() {
         let mut one = Told { point, force: [0.0; D], gap: 0.0, slid: 0.0, status: 0.0 };
@@ -117,8 +121,12 @@ fn told<const D: usize>(
             area += weight * words[D + 3];
         }
         if one.status > 0.0 {
-            // A node that one body hardly reaches moves at will, and has no share of the surface.
-            one.slid = if area > 0.0 { slid / area } else { 0.0 };
+            if area > least {
+                one.slid = slid / area;
+            } else {
+                // A node that one body hardly reaches moves at will: its force alone is told.
+                (one.gap, one.status) = (0.0, 0.0);
+            }
             told.push(one);
         }
     }

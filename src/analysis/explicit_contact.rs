@@ -69,7 +69,8 @@ impl<const D: usize> ContactSteps<D> {
             let shares = exerted.iter().flat_map(|all| all.force.into_iter().chain(all.torque));
             let sums = world.sum_slice(&shares.collect::<Vec<f64>>());
             let dt = span.time_end - span.time_start;
-            for (rigid, (body, sums)) in self.free.0.iter_mut().zip(sums.chunks_exact(6)).enumerate()
+            for (rigid, (body, sums)) in
+                self.free.0.iter_mut().zip(sums.chunks_exact(6)).enumerate()
             {
                 let Some(body) = body else { continue };
                 if !model.contacts.rigids[rigid].presence.is_in(span.stage) {

@@ -236,11 +236,6 @@ impl<const D: usize> FreeMotion<D> {
         matrix
     }
 
-    /// Solves of the step so far.
-    pub fn rounds(&self) -> usize {
-        self.rounds
-    }
-
     /// The bodies at the step's end: where the last solve had them, with the momentum of its forces.
     pub fn finish(&self, free: &mut FreeBodies<D>) {
         for (index, moving) in self.moving.iter().enumerate() {

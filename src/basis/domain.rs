@@ -87,7 +87,8 @@ pub fn update_rectangles<const D: usize>(
                 with_product(lengths, increment.determinant() * product(before))
             }
             DomainUpdate::Corners => {
-                let lengths = extent_of_moved_sides(step.grids[0], points, p, &|node| (step.nodal)(p, node))?;
+                let lengths =
+                    extent_of_moved_sides(step.grids[0], points, p, &|node| (step.nodal)(p, node))?;
                 let volume = section_determinant::<D>(gradient) * product(initial);
                 let lengths = with_product(lengths, volume);
                 let of_stretch = extent_of_stretched_sides(initial, gradient);

@@ -136,7 +136,11 @@ fn slip_in_contact<const D: usize>(reached: &Reached<D>) -> ([f64; D], Square<D>
     let before = reached.gap_before;
     // A corner that was apart touches when its way is done to the share 1 - θ.
     let apart = before > 0.0;
-    let share = if apart { (-gap).max(0.0) / (before - gap) } else { 1.0 };
+    let share = match apart {
+        true if gap < 0.0 => -gap / (before - gap),
+        true => 0.0,
+        false => 1.0,
+    };
     let by_gap = if apart && gap < 0.0 { -before / ((before - gap) * (before - gap)) } else { 0.0 };
     let along = dot(&n, &v);
     let curved: [f64; D] = std::array::from_fn(|i| dot(&curvature[i], &v));

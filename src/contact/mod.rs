@@ -51,7 +51,7 @@ pub(crate) mod surface;
 pub(crate) mod told;
 pub(crate) mod triangles;
 
-pub use contacts::{BodyPair, Contacts, Pair};
+pub use contacts::{Contacts, Pair};
 pub use surface::Near;
 
 #[cfg(test)]

@@ -7,6 +7,9 @@ use crate::contact::surface::length;
 use crate::contact::told::{self, Told, tell};
 use crate::points::{Points, Snapshot};
 
+/// Slip, of the elastic slip and the depth, up to which a corner sticks: round-off.
+const STILL: f64 = 1e-9;
+
 /// What a rigid body exerts, this rank's share.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Exerted {
@@ -115,7 +118,7 @@ impl<const D: usize> Finished<D> {
         self.dissipation += stiffness * held * slid;
         if let Some(told) = &mut self.told {
             let force = response.traction.map(|t| of.area * t);
-            let slides = slid > 0.0 || law.friction == Friction::Smooth;
+            let slides = slid > STILL * (held + gap.abs()) || law.friction == Friction::Smooth;
             let status = if slides { told::SLIDES } else { told::STICKS };
             told.push(Told { point: of.point, force, gap: gap.min(0.0), slid, status });
         }
