@@ -13,6 +13,7 @@ use hardening::solve;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;
 use mpm_par::amg;
+use mpm_par::amg::tied::Ties;
 use mpm_par::amg::{CoarsestRows, Hierarchy};
 use mpm_par::blocks::BlockProduct;
 use mpm_par::parallel::World;
@@ -22,8 +23,8 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 fn build<const D: usize>(world: &World, share: &Share<D>) -> Hierarchy {
     let made = match D {
-        2 => amg::build::<D, 3>(world, &share.nodes, &share.rows),
-        _ => amg::build::<D, 6>(world, &share.nodes, &share.rows),
+        2 => amg::build::<D, 3>(world, &share.nodes, &share.rows, &Ties::default()),
+        _ => amg::build::<D, 6>(world, &share.nodes, &share.rows, &Ties::default()),
     };
     made.unwrap().expect("the nodes are coupled")
 }

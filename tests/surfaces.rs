@@ -114,6 +114,31 @@ fn a_block_on_an_inclined_plane_presses_with_its_weight() {
     }
 }
 
+/// The sum over a step's solves hardly depends on the penalty, on h and on the ranks: 42 and 53 for 10
+/// and 100 at h = 1/80 (docs/evidence/contact.md).
+#[test]
+fn linear_iterations_hardly_grow_with_the_penalty() {
+    let count = |h: f64, penalty: f64, ranks: usize| {
+        let run = incline(25.0, h)
+            .ranks(ranks)
+            .set("analysis.steps=1")
+            .set("output.every=1")
+            .set(format!("boundary.0.penalty={penalty}"))
+            .set(format!("boundary.1.penalty={penalty}"))
+            .set("petsc={qs_pc_type=\"mg\",qs_ksp_type=\"cg\",qs_ksp_rtol=\"1e-8\"}");
+        last(&run.results(), "linear_iterations")
+    };
+    let (soft, stiff, stiffest) =
+        (count(0.025, 10.0, 1), count(0.025, 100.0, 1), count(0.025, 1000.0, 1));
+    assert!(stiff < 1.5 * soft && stiffest < 1.5 * soft, "{soft}, {stiff}, {stiffest}");
+    let fine = count(0.0125, 100.0, 1);
+    assert!(fine < 1.2 * stiff, "{stiff} at 1/40, {fine} at 1/80");
+    for ranks in [2, 3] {
+        let spread = count(0.025, 100.0, ranks);
+        assert!((spread - stiff).abs() <= 2.0, "{spread} on {ranks} ranks, {stiff} on one");
+    }
+}
+
 /// Measured at 25 degrees: u to 9.8e-3, 4.3e-3 and 2.1e-3 at h = 1/10, 1/20 and 1/40 of the height.
 #[test]
 fn settlement_and_stress_on_an_inclined_plane_are_those_on_rollers() {

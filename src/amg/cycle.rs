@@ -5,6 +5,7 @@
 //! answer does not change. The levels are symmetric. Under an unsymmetric matrix A they are those of
 //! (A + A^T) / 2.
 
+use super::block_smoother::BlockSmoother;
 use crate::blocks::BlockProduct;
 use crate::error::{Error, Result};
 use crate::petsc::abort::unless_shared;
@@ -26,10 +27,12 @@ pub struct Hierarchy {
 pub struct Smoothed {
     /// Its matrix A.
     pub product: BlockProduct<f32>,
-    /// Largest eigenvalue of D^-1 A.
+    /// Largest eigenvalue of D^-1 A, with what smooths for D.
     pub largest: f64,
     /// P, from the next level to this one.
     pub transfer: BlockProduct<f32>,
+    /// What stands in the place of D where penalties tie nodes.
+    pub tied: Option<BlockSmoother>,
 }
 
 /// This rank's rows of the last level, compressed: global columns, ascending.
@@ -61,6 +64,12 @@ pub trait Levelled {
         exact: &mut BlockProduct<f64>,
         finest: &mut BlockProduct<f32>,
     ) -> Result<()>;
+
+    /// Gives the smoother of the finest level the values that the matrix has now, where
+    /// [`Self::hierarchy`] made one with a block of tied nodes.
+    fn tie(&mut self, _matrix: &mut Matrix, _smoother: &mut BlockSmoother) -> Result<()> {
+        Ok(())
+    }
 }
 
 /// Chebyshev's smoother takes care of the eigenvalues between these shares of the largest: further
@@ -123,10 +132,15 @@ impl Levels {
             self.0 = installed.map_err(|error| unless_shared(solver.comm(), error))?;
         }
         let Some(levels) = &mut self.0 else { return Ok(()) };
-        levels.follow(solver, state, |exact, finest| {
+        if !levels.hold(state) {
             // Ranks write their rows together: an error on one must not leave the others waiting.
-            agree(solver.comm(), problem.fill(matrix, exact, finest))
-        })?;
+            levels.follow(state, |exact, finest| {
+                agree(solver.comm(), problem.fill(matrix, exact, finest))
+            })?;
+            multigrid::renew_finest_smoother(solver, |smoother: &mut BlockSmoother| {
+                agree(solver.comm(), problem.tie(matrix, smoother))
+            })?;
+        }
         multigrid::multiply_by(solver, &levels.exact, matrix)
     }
 
@@ -146,7 +160,9 @@ impl Installed {
     fn new(solver: &Ksp, state: u64, hierarchy: Hierarchy) -> Result<Self> {
         let Hierarchy { exact, levels, coarsest } = hierarchy;
         let comm = solver.comm();
-        let level = |Smoothed { product, largest, transfer }| -> Result<_> {
+        let mut smoothers = Vec::new();
+        let level = |Smoothed { product, largest, transfer, tied }| -> Result<_> {
+            smoothers.push(tied);
             Ok(Level {
                 matrix: ProductMatrix::new(comm, product)?,
                 transfer: ProductMatrix::new(comm, transfer)?,
@@ -160,7 +176,7 @@ impl Installed {
         let CoarsestRows { block, offsets, columns, values } = coarsest;
         let rows = offsets.len() - 1;
         let coarsest = Matrix::from_csr(comm, block, rows, &offsets, &columns, &values)?;
-        multigrid::install(solver, &levels, &coarsest)?;
+        multigrid::install(solver, &levels, smoothers, &coarsest)?;
         let exact = ProductMatrix::new(comm, exact)?;
         Ok(Installed { made: state, filled: state, exact, levels, pace: None, slow: false })
     }
@@ -170,20 +186,20 @@ impl Installed {
         self.made == state || (kept && !self.slow)
     }
 
-    /// Lets `fill` write the values of `state` into the exact matrix and the finest level's, if
-    /// they are not there yet; the finest smoother follows, the other levels stay.
+    /// Whether the values of `state` are in the matrices.
+    fn hold(&self, state: u64) -> bool {
+        self.filled == state
+    }
+
+    /// Lets `fill` write the values of `state` into the exact matrix and the finest level's; the finest
+    /// smoother is to follow, the other levels stay.
     fn follow(
         &mut self,
-        solver: &Ksp,
         state: u64,
         fill: impl FnOnce(&mut BlockProduct<f64>, &mut BlockProduct<f32>) -> Result<()>,
     ) -> Result<()> {
-        if self.filled == state {
-            return Ok(());
-        }
         self.filled = state;
         let finest = &mut self.levels[0].matrix;
-        self.exact.change(|exact| finest.change(|rounded| fill(exact, rounded)))?;
-        multigrid::renew_finest_smoother(solver)
+        self.exact.change(|exact| finest.change(|rounded| fill(exact, rounded)))
     }
 }

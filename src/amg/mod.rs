@@ -13,6 +13,8 @@
 //! | nodes and rows of a level | `level.rs` |
 //! | levels under a solver | `cycle.rs` |
 //! | symmetric part of an unsymmetric system | `symmetric_part.rs` |
+//! | nodes that penalties tie | `tied.rs` |
+//! | their smoother | `block_smoother.rs` |
 //!
 //! The levels are those of a symmetric matrix. Under an unsymmetric A they are made from
 //! (A + A^T) / 2, and the iteration outside multiplies by A.
@@ -22,6 +24,7 @@
 //! any number of them.
 
 pub(crate) mod aggregate;
+pub(crate) mod block_smoother;
 pub(crate) mod cycle;
 pub(crate) mod galerkin;
 pub mod level;
@@ -31,9 +34,10 @@ pub(crate) mod rigid;
 pub(crate) mod spectrum;
 pub(crate) mod strength;
 pub mod symmetric_part;
+pub mod tied;
 
 use crate::petsc::{Index, Product};
-use level::{Assembled, Nodes, Rows};
+use level::{Assembled, BlockCsr, Nodes, Rows};
 use symmetric_part::symmetric_part;
 
 use crate::blocks::{BlockProduct, Stored};
@@ -42,12 +46,14 @@ use crate::grid::Grid;
 use crate::parallel::World;
 use crate::system::numbering::Numbering;
 
+pub use block_smoother::BlockSmoother;
 pub use cycle::{CoarsestRows, Hierarchy, Levelled, Levels, Smoothed};
 
 use aggregate::Aggregates;
 use galerkin::Coarse;
 use prolongator::{Lengths, Parts, Prolongator};
 use strength::Strong;
+use tied::Ties;
 
 /// Degrees of freedom that are few enough to be solved directly.
 const COARSEST: usize = 600;
@@ -71,28 +77,58 @@ struct Coarsening {
 const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
 const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
-/// The hierarchy under an assembled system of displacements, which may be `symmetric` or not.
-/// Collective.
+/// The hierarchy under an assembled system of displacements, which may be `symmetric` or not;
+/// `ties`: what penalties do to it. Collective.
 pub fn of_system<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     numbering: &Numbering,
     rows: &Assembled,
+    ties: &Ties<D>,
     symmetric: bool,
 ) -> Result<Option<Hierarchy>> {
     let nodes = Nodes {
+        position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
+        key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
+        ..nodes_of(numbering)
+    };
+    match (D, symmetric) {
+        (2, true) => build::<D, 3>(world, &nodes, rows, ties),
+        (2, false) => build_unsymmetric::<D, 3>(world, &nodes, rows, ties),
+        (_, true) => build::<D, 6>(world, &nodes, rows, ties),
+        (_, false) => build_unsymmetric::<D, 6>(world, &nodes, rows, ties),
+    }
+}
+
+/// Nodes of the finest level without what groups are made by.
+fn nodes_of(numbering: &Numbering) -> Nodes {
+    Nodes {
         owned: numbering.owned,
         global: numbering.global.clone(),
         halo: numbering.halo.clone(),
-        position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
-        key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
-    };
-    match (D, symmetric) {
-        (2, true) => build::<2, 3>(world, &nodes, rows),
-        (2, false) => build_unsymmetric::<2, 3>(world, &nodes, rows),
-        (_, true) => build::<3, 6>(world, &nodes, rows),
-        (_, false) => build_unsymmetric::<3, 6>(world, &nodes, rows),
+        ..Nodes::default()
     }
+}
+
+/// The symmetric part of an unsymmetric system, with the corrections of `ties`. Collective.
+pub fn surrogate<const D: usize>(
+    world: &World,
+    numbering: &Numbering,
+    rows: &impl Rows<D>,
+    ties: &Ties<D>,
+) -> Result<BlockCsr<D>> {
+    surrogate_of(world, &nodes_of(numbering), rows, ties)
+}
+
+fn surrogate_of<const K: usize>(
+    world: &World,
+    nodes: &Nodes,
+    rows: &impl Rows<K>,
+    ties: &Ties<K>,
+) -> Result<BlockCsr<K>> {
+    let mut part = symmetric_part(world, nodes.owned, &nodes.global, &nodes.halo, rows)?;
+    ties.correct(world, nodes, &mut part)?;
+    Ok(part)
 }
 
 fn padded<const D: usize>(position: [f64; D]) -> [f64; 3] {
@@ -108,18 +144,19 @@ fn key(node: u64) -> f64 {
 }
 
 /// The hierarchy under the symmetric matrix `rows` of `K` displacements per node; `C`: rigid-body
-/// modes, 3 in the plane and 6 in space. `None` where no node is coupled to another. Collective.
+/// modes, 3 in the plane and 6 in space; `ties`: what penalties do to it. `None` where no node is coupled to another. Collective.
 pub fn build<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,
     rows: &impl Rows<K>,
+    ties: &Ties<K>,
 ) -> Result<Option<Hierarchy>> {
     let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
     let mut exact = BlockProduct::symmetric::<K>(nodes.owned, ghosts.clone(), count);
     fill(rows, &mut exact);
     let mut rounded = BlockProduct::symmetric::<K>(nodes.owned, ghosts, count);
     exact.round_into(&mut rounded);
-    levels::<K, C>(world, nodes, rows, exact, rounded)
+    levels::<K, C>(world, (nodes, rows, &ties.nodes), exact, rounded)
 }
 
 /// As [`build`], under a matrix that need not be symmetric but has a symmetric pattern. Collective.
@@ -127,31 +164,31 @@ pub fn build_unsymmetric<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,
     rows: &impl Rows<K>,
+    ties: &Ties<K>,
 ) -> Result<Option<Hierarchy>> {
     let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
     let mut exact = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
     fill(rows, &mut exact);
-    let symmetric = symmetric_part(world, nodes.owned, &nodes.global, &nodes.halo, rows)?;
+    let symmetric = surrogate_of(world, nodes, rows, ties)?;
     let rounded = product(nodes, &symmetric);
-    levels::<K, C>(world, nodes, &symmetric, exact, rounded)
+    levels::<K, C>(world, (nodes, &symmetric, &ties.nodes), exact, rounded)
 }
 
 /// The hierarchy with `exact` outside and the symmetric `rows`, rounded, on the finest level.
 fn levels<const K: usize, const C: usize>(
     world: &World,
-    nodes: &Nodes,
-    rows: &impl Rows<K>,
+    (nodes, rows, tied): (&Nodes, &impl Rows<K>, &[bool]),
     exact: BlockProduct<f64>,
     rounded: BlockProduct<f32>,
 ) -> Result<Option<Hierarchy>> {
     let mut levels = Vec::new();
-    let first = coarsen::<K, C>(world, nodes, rows, rounded, 1.0, FINEST)?;
+    let first = coarsen::<K, C>(world, (nodes, rows, tied), rounded, 1.0, FINEST)?;
     let Some((level, mut coarse, mut length)) = first else { return Ok(None) };
     levels.push(level);
     while levels.len() < MOST_LEVELS && world.sum_usize(coarse.nodes.owned) * C > COARSEST {
         let (nodes, rows) = (&coarse.nodes, &coarse.rows);
         let product = product(nodes, rows);
-        let next = coarsen::<C, C>(world, nodes, rows, product, length, COARSER)?;
+        let next = coarsen::<C, C>(world, (nodes, rows, &[]), product, length, COARSER)?;
         let Some((level, coarser, coarser_length)) = next else { break };
         levels.push(level);
         (coarse, length) = (coarser, coarser_length);
@@ -163,8 +200,7 @@ fn levels<const K: usize, const C: usize>(
 /// nodes to be worth having, or none.
 fn coarsen<const K: usize, const C: usize>(
     world: &World,
-    nodes: &Nodes,
-    rows: &impl Rows<K>,
+    (nodes, rows, tied): (&Nodes, &impl Rows<K>, &[bool]),
     product: BlockProduct<f32>,
     length: f64,
     how: Coarsening,
@@ -175,8 +211,7 @@ fn coarsen<const K: usize, const C: usize>(
     if aggregates.total == 0 || aggregates.total as f64 > how.most_left * all as f64 {
         return Ok(None);
     }
-    let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };
-    let inverse: Vec<f64> = product.diagonal().into_iter().map(one_over).collect();
+    let inverse = inverse_diagonal(&product);
     let largest = spectrum::largest::<K>(world, nodes, &product, &inverse)?;
     let lengths = Lengths::measured(world, nodes, &aggregates, length);
     let damping = if largest > 0.0 { DAMPING / largest } else { 0.0 };
@@ -191,8 +226,34 @@ fn coarsen<const K: usize, const C: usize>(
     let prolongator = Prolongator::<K, C>::smoothed(world, rows, &parts)?;
     let coarse = galerkin::coarse_operator(world, nodes, rows, &prolongator, &aggregates)?;
     let transfer = transfer(nodes, &prolongator, &coarse.nodes);
-    let level = Smoothed { product, largest, transfer };
+    let mut level = Smoothed { product, largest, transfer, tied: None };
+    if let Some(block) = tied::block_of(world, nodes, rows, tied)? {
+        let mut smoother = BlockSmoother::new(world.comm(), inverse, Some(&block))?;
+        let largest = spectrum::largest_smoothed::<K>(world, nodes, &level.product, &mut smoother)?;
+        if let Some(largest) = largest {
+            (level.largest, level.tied) = (largest, Some(smoother));
+        }
+    }
     Ok(Some((level, coarse, lengths.coarse)))
+}
+
+/// One over the diagonal, zero where that is not positive.
+fn inverse_diagonal(product: &BlockProduct<f32>) -> Vec<f64> {
+    let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };
+    product.diagonal().into_iter().map(one_over).collect()
+}
+
+/// Gives a smoother's block of tied nodes the values of the symmetric `rows`. Collective.
+pub fn tie<const D: usize>(
+    world: &World,
+    numbering: &Numbering,
+    rows: &impl Rows<D>,
+    tied: &[bool],
+    smoother: &mut BlockSmoother,
+) -> Result<()> {
+    let nodes = nodes_of(numbering);
+    let block = tied::block_of(world, &nodes, rows, tied)?;
+    smoother.renew(inverse_diagonal(&product(&nodes, rows)), block.as_ref())
 }
 
 /// A level's matrix for the cycle.

@@ -202,7 +202,7 @@ impl<const D: usize> Levelled for Chain<D> {
             BlockProduct::collect::<D, D>(BLOCKS, BLOCKS, Vec::new(), BLOCKS, |k, row| {
                 row.push((k, unit));
             });
-        let levels = vec![Smoothed { product, largest: 1.5, transfer }];
+        let levels = vec![Smoothed { product, largest: 1.5, transfer, tied: None }];
         Ok(Some(Hierarchy { exact, levels, coarsest: rows::<D>(self.first) }))
     }
 

@@ -277,6 +277,13 @@ impl Matrix {
         self.rows
     }
 
+    /// Rows on all ranks.
+    pub fn rows_all(&self) -> Result<usize> {
+        let mut rows = 0;
+        petsc!(MatGetSize(self.raw, &mut rows, null_mut()))?;
+        Ok(rows as usize)
+    }
+
     /// Entries on this rank.
     pub fn entries_local(&self) -> usize {
         self.row_offsets.last().copied().unwrap_or(0)

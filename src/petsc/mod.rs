@@ -13,6 +13,7 @@
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `product_matrix.rs` | [`Product`]: a matrix that is known by its products |
 //! | `multigrid.rs` | the cycle under a solver, on levels that are given |
+//! | `smoother.rs` | [`Smoother`](multigrid::Smoother): a preconditioner of the program's in that cycle |
 //! | `blas.rs` | the kernel that OpenBLAS runs |
 //! | `factors.rs` | whose factors direct solvers take: MUMPS's, or PETSc's own |
 //! | `object.rs` | handles given back when they go out of scope |
@@ -41,6 +42,7 @@ pub mod options;
 pub(crate) mod product_matrix;
 pub(crate) mod session;
 mod shell;
+mod smoother;
 pub mod snes;
 pub(crate) mod sys;
 pub(crate) mod vector;

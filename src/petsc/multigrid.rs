@@ -11,6 +11,8 @@ use mpi::traits::{Communicator, CommunicatorCollectives};
 use super::check::{petsc, text_of};
 use super::options::set_default;
 use super::product_matrix::{Product, ProductMatrix};
+use super::smoother;
+pub use super::smoother::Smoother;
 use super::{Ksp, Matrix, sys};
 use crate::error::{Error, Result};
 
@@ -34,17 +36,19 @@ fn preconditioner(solver: &Ksp) -> Result<sys::PC> {
     Ok(pc)
 }
 
-fn is_type(pc: sys::PC, kind: &[u8]) -> Result<bool> {
+pub(super) fn is_type(pc: sys::PC, kind: &[u8]) -> Result<bool> {
     let mut same = sys::PETSC_FALSE;
     petsc!(PetscObjectTypeCompare(pc.cast(), kind.as_ptr().cast(), &mut same))?;
     Ok(same != sys::PETSC_FALSE)
 }
 
 /// Puts `levels`, from the finest to the last but one, and the last, `coarsest`, under a solver with
-/// operators; whatever it had goes. Collective.
-pub(crate) fn install<P: Product>(
+/// operators; whatever it had goes. The first of `smoothers` goes under Chebyshev's iteration on the
+/// finest level, and so on; Jacobi's where there is none. Collective.
+pub(crate) fn install<P: Product, S: Smoother>(
     solver: &Ksp,
     levels: &[Level<P>],
+    smoothers: Vec<Option<S>>,
     coarsest: &Matrix,
 ) -> Result<()> {
     let count = levels.len() as sys::PetscInt;
@@ -52,25 +56,33 @@ pub(crate) fn install<P: Product>(
     petsc!(PCSetType(pc, sys::PCNONE.as_ptr().cast()))?;
     petsc!(PCSetType(pc, sys::PCMG.as_ptr().cast()))?;
     petsc!(PCMGSetLevels(pc, count + 1, null_mut()))?;
-    for (number, level) in (1..=count).rev().zip(levels) {
-        put_level(pc, number, level)?;
+    for ((number, level), smoother) in (1..=count).rev().zip(levels).zip(smoothers) {
+        put_level(pc, number, level, smoother)?;
     }
     put_coarsest(solver, pc, coarsest)?;
     petsc!(PCSetFromOptions(pc))
 }
 
 /// Smoother, residual and transfer of a level.
-fn put_level<P: Product>(pc: sys::PC, number: sys::PetscInt, level: &Level<P>) -> Result<()> {
-    let (mut smoother, mut inner) = (null_mut(), null_mut());
-    petsc!(PCMGGetSmoother(pc, number, &mut smoother))?;
-    petsc!(KSPSetType(smoother, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
-    petsc!(KSPGetPC(smoother, &mut inner))?;
-    petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?;
+fn put_level<P: Product, S: Smoother>(
+    pc: sys::PC,
+    number: sys::PetscInt,
+    level: &Level<P>,
+    own: Option<S>,
+) -> Result<()> {
+    let (mut chebyshev, mut inner) = (null_mut(), null_mut());
+    petsc!(PCMGGetSmoother(pc, number, &mut chebyshev))?;
+    petsc!(KSPSetType(chebyshev, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
+    petsc!(KSPGetPC(chebyshev, &mut inner))?;
+    match own {
+        Some(own) => smoother::put(inner, own)?,
+        None => petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?,
+    }
     let (matrix, transfer) = (level.matrix.raw(), level.transfer.raw());
-    petsc!(KSPSetOperators(smoother, matrix, matrix))?;
+    petsc!(KSPSetOperators(chebyshev, matrix, matrix))?;
     let [low, high] = level.smoothed;
-    petsc!(KSPChebyshevSetEigenvalues(smoother, high, low))?;
-    petsc!(KSPSetFromOptions(smoother))?;
+    petsc!(KSPChebyshevSetEigenvalues(chebyshev, high, low))?;
+    petsc!(KSPSetFromOptions(chebyshev))?;
     // PETSc would find out in the middle of a cycle, and not get out of it without a crash.
     if is_type(inner, sys::PCSOR)? || is_type(inner, sys::PCEISENSTAT)? {
         return Err(Error::Input(
@@ -100,12 +112,20 @@ fn put_coarsest(solver: &Ksp, pc: sys::PC, matrix: &Matrix) -> Result<()> {
     Ok(())
 }
 
-/// Lets the smoother of the finest level follow the values of its matrix.
-pub(crate) fn renew_finest_smoother(solver: &Ksp) -> Result<()> {
-    let (pc, mut levels, mut smoother) = (preconditioner(solver)?, 0, null_mut());
+/// Lets the smoother of the finest level follow the values of its matrix; one of the program's by
+/// `renew`.
+pub(crate) fn renew_finest_smoother<S: Smoother>(
+    solver: &Ksp,
+    renew: impl FnOnce(&mut S) -> Result<()>,
+) -> Result<()> {
+    let (pc, mut levels, mut chebyshev) = (preconditioner(solver)?, 0, null_mut());
+    let mut inner = null_mut();
     petsc!(PCMGGetLevels(pc, &mut levels))?;
-    petsc!(PCMGGetSmoother(pc, levels - 1, &mut smoother))?;
-    petsc!(KSPSetUp(smoother))
+    petsc!(PCMGGetSmoother(pc, levels - 1, &mut chebyshev))?;
+    petsc!(KSPGetPC(chebyshev, &mut inner))?;
+    // SAFETY: the shells in this cycle are those of `install`, all of one type.
+    unsafe { smoother::with(inner, renew) }?;
+    petsc!(KSPSetUp(chebyshev))
 }
 
 /// Makes the iteration multiply by `product`, which stands for `matrix`.

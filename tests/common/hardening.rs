@@ -3,6 +3,7 @@
 
 use mpm_par::amg::level::BlockCsr;
 use mpm_par::amg::symmetric_part::symmetric_part;
+use mpm_par::amg::tied::Ties;
 use mpm_par::amg::{self, Hierarchy, Levelled, Levels};
 use mpm_par::blocks::BlockProduct;
 use mpm_par::error::Result;
@@ -141,10 +142,10 @@ impl<const D: usize> Levelled for Hardening<'_, D> {
         let rows = self.of_matrix(matrix)?;
         let (world, nodes) = (self.world, &self.share.nodes);
         match (D, self.symmetric) {
-            (2, true) => amg::build::<D, 3>(world, nodes, &rows),
-            (2, false) => amg::build_unsymmetric::<D, 3>(world, nodes, &rows),
-            (_, true) => amg::build::<D, 6>(world, nodes, &rows),
-            (_, false) => amg::build_unsymmetric::<D, 6>(world, nodes, &rows),
+            (2, true) => amg::build::<D, 3>(world, nodes, &rows, &Ties::default()),
+            (2, false) => amg::build_unsymmetric::<D, 3>(world, nodes, &rows, &Ties::default()),
+            (_, true) => amg::build::<D, 6>(world, nodes, &rows, &Ties::default()),
+            (_, false) => amg::build_unsymmetric::<D, 6>(world, nodes, &rows, &Ties::default()),
         }
     }
 

@@ -1,8 +1,7 @@
 //! What Newton's method asks of the equations: residual, tangent, reactions, end of the iteration.
 
 use crate::amg::level::Assembled;
-use crate::amg::symmetric_part::symmetric_part;
-use crate::amg::{self, Hierarchy, Levelled, Levels};
+use crate::amg::{self, BlockSmoother, Hierarchy, Levelled, Levels};
 use crate::analysis::convergence::{converges_next, hardly_falls};
 use crate::blocks::BlockProduct;
 use crate::error::Result;
@@ -108,8 +107,19 @@ impl<const D: usize> Levelled for Equilibrium<'_, D> {
 
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         self.with_rows(matrix, |rows| {
-            let symmetric = self.symmetric();
-            amg::of_system(self.world, self.grid, self.numbering, rows, symmetric)
+            let (ties, symmetric) = (self.ties(rows)?, self.symmetric());
+            amg::of_system(self.world, self.grid, self.numbering, rows, &ties, symmetric)
+        })
+    }
+
+    fn tie(&mut self, matrix: &mut Matrix, smoother: &mut BlockSmoother) -> Result<()> {
+        self.with_rows(matrix, |rows| {
+            let (world, of, ties) = (self.world, self.numbering, self.ties(rows)?);
+            if self.symmetric() {
+                return amg::tie::<D>(world, of, rows, &ties.nodes, smoother);
+            }
+            let part = amg::surrogate(world, of, rows, &ties)?;
+            amg::tie(world, of, &part, &ties.nodes, smoother)
         })
     }
 
@@ -125,8 +135,7 @@ impl<const D: usize> Levelled for Equilibrium<'_, D> {
                 exact.round_into(finest);
                 return Ok(());
             }
-            let (world, of) = (self.world, self.numbering);
-            let part = symmetric_part(world, of.owned, &of.global, &of.halo, rows)?;
+            let part = amg::surrogate(self.world, self.numbering, rows, &self.ties(rows)?)?;
             amg::fill::<_, D>(&part, finest);
             Ok(())
         })

@@ -6,6 +6,7 @@
 
 mod error;
 mod iteration;
+mod ties;
 
 use crate::amg::Levels;
 use crate::deck::model::{Frame, InvertedIterates};

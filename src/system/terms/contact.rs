@@ -27,7 +27,7 @@ use crate::system::step_system::Discretisation;
 use crate::tensor::Square;
 use crate::tensor::dense::dot;
 
-use super::term::{At, Health, Part, Term};
+use super::term::{At, Correction, Health, Part, Term};
 use super::touching::{Corner, Exerted, Finished};
 
 /// Cells within which a corner may come to a surface in a step.
@@ -268,12 +268,18 @@ impl<const D: usize> ContactTerm<D> {
         std::array::from_fn(|i| of.elastic[i] + to[i] - from[i])
     }
 
+    /// The surface below a corner at `x` at the step's end.
+    fn near_at_end(&self, of: &Candidate<D>, x: &[f64; D]) -> Near<D> {
+        let rigid = self.contacts.pairs[of.pair].rigid;
+        self.poses[1][rigid].near(&*self.contacts.rigids[rigid].surface, x)
+    }
+
     /// What acts on a corner at `x` at the step's end, and the gap there; `None` where it does not
     /// touch.
     fn respond(&self, of: &Candidate<D>, x: &[f64; D]) -> Option<(f64, Response<D>)> {
         let rigid = self.contacts.pairs[of.pair].rigid;
         let pose = &self.poses[1][rigid];
-        let near = pose.near(&*self.contacts.rigids[rigid].surface, x);
+        let near = self.near_at_end(of, x);
         if !self.touches(&near) {
             return None;
         }
@@ -508,6 +514,41 @@ impl<const D: usize> Term<D> for &ContactTerm<D> {
             traction.iter().map(|t| (of.area * t) * (of.area * t)).sum::<f64>()
         };
         self.candidates.iter().map(squared).sum()
+    }
+
+    fn add_penalties(&self, at: At<'_>, stiffness: &mut [f64]) {
+        for of in &self.candidates {
+            if self.respond(of, &self.position(of, at.displacement)).is_some() {
+                let penalty = self.law(of).penalty * of.area;
+                self.entries(of).for_each(|(node, w)| stiffness[node] += penalty * w * w);
+            }
+        }
+    }
+
+    /// Sliding couples the tangential force to the gap, μ ε t n: the symmetric part of that has the
+    /// eigenvalues ±μ ε / 2, and with them no cycle of multigrid is definite. It is taken away: with
+    /// N = n n and T = 1 - N the stiffness S keeps N S N + T S T.
+    fn correct_surrogate(&self, at: At<'_>, corrections: &mut Vec<Correction<D>>) {
+        for of in &self.candidates {
+            let x = self.position(of, at.displacement);
+            let Some((_, response)) = self.respond(of, &x) else { continue };
+            let n = self.near_at_end(of, &x).normal;
+            let s: Square<D> = std::array::from_fn(|i| {
+                std::array::from_fn(|j| 0.5 * (response.stiffness[i][j] + response.stiffness[j][i]))
+            });
+            let along: [f64; D] = std::array::from_fn(|i| dot(&s[i], &n));
+            let twice = 2.0 * dot(&along, &n);
+            let coupling: Square<D> = std::array::from_fn(|i| {
+                std::array::from_fn(|j| n[i] * along[j] + along[i] * n[j] - twice * n[i] * n[j])
+            });
+            for (a, of_a) in self.entries(of) {
+                for (b, of_b) in self.entries(of) {
+                    let factor = -of.area * of_a * of_b;
+                    let block = coupling.map(|row| row.map(|c| factor * c));
+                    corrections.push((a as u32, b as u32, block));
+                }
+            }
+        }
     }
 
     /// A gap carries the round-off of the place.

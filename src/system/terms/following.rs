@@ -54,6 +54,13 @@ impl<'a, const D: usize> Following<'a, D> {
         }
     }
 
+    /// Adds the stiffness by which supports hold local nodes, this rank's share, N/m.
+    pub fn add_penalties(&self, stiffness: &mut [f64]) {
+        if let Some(surface) = &self.surface {
+            surface.add_penalties(self.step, stiffness);
+        }
+    }
+
     /// This rank's share of the force at `nodes` local nodes at the step's start, N.
     pub fn at_start(&self, pattern: &Pattern, nodes: usize) -> Vec<f64> {
         let mut force = match &self.pressure {

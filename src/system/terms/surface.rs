@@ -290,6 +290,18 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
         borne
     }
 
+    /// Adds the stiffness by which supports hold local nodes, this rank's share, N/m.
+    pub fn add_penalties(&self, step: StepPoints<'_, D>, stiffness: &mut [f64]) {
+        for act in &self.acts {
+            let Kind::Held(_, penalty) = act.kind else { continue };
+            let nodes = step.nodes_of_group(act.group);
+            let of_area = penalty * norm(&act.element.area);
+            for (&node, w) in nodes.iter().zip(self.weights_of(act, nodes)) {
+                stiffness[node as usize] += of_area * w * w;
+            }
+        }
+    }
+
     fn weights_of(&self, act: &Act<'_, D>, nodes: &[u32]) -> &[f64] {
         &self.weights[act.weights..act.weights + nodes.len()]
     }

@@ -3,6 +3,7 @@
 use crate::system::in_place::InPlace;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockMatrix;
+use crate::tensor::Square;
 
 /// An iterate.
 #[derive(Clone, Copy)]
@@ -12,6 +13,9 @@ pub struct At<'a> {
     /// Nodal increments of the local degrees of freedom, m.
     pub displacement: &'a [f64],
 }
+
+/// An addition to a matrix: two local nodes and the block that couples them, N/m.
+pub type Correction<const D: usize> = (u32, u32, Square<D>);
 
 /// Which shares are asked for: what other ranks wait for comes first, and travels while the rest is
 /// added up.
@@ -79,6 +83,14 @@ pub trait Term<const D: usize> {
     fn first_in_rows(&self) -> Option<(&BlockMatrix<1>, &[bool])> {
         None
     }
+
+    /// Adds the stiffness by which penalties hold local nodes, this rank's share, N/m: multigrid smooths
+    /// them together where it exceeds the material's.
+    fn add_penalties(&self, _at: At<'_>, _stiffness: &mut [f64]) {}
+
+    /// Appends what makes the symmetric part of an unsymmetric tangent definite, by local nodes, N/m:
+    /// multigrid's levels are made of the sum.
+    fn correct_surrogate(&self, _at: At<'_>, _corrections: &mut Vec<Correction<D>>) {}
 
     /// Energy of the increments that the points do not hold, this rank's share, J.
     fn energy(&self, _at: At<'_>) -> f64 {

@@ -1,0 +1,53 @@
+//! What multigrid has to know of penalties: which nodes they stiffen, and what of their tangent has no
+//! definite symmetric part.
+
+use crate::amg::level::{Assembled, Rows};
+use crate::amg::tied::Ties;
+use crate::error::Result;
+
+use super::Equilibrium;
+
+/// Share of a node's own stiffness, all components, from which on a penalty ties it.
+const TIED: f64 = 0.1;
+
+impl<const D: usize> Equilibrium<'_, D> {
+    /// Of the last evaluation, whose tangent the matrix's `rows` hold. Collective.
+    pub(super) fn ties(&self, rows: &Assembled) -> Result<Ties<D>> {
+        let (world, of) = (self.world, self.numbering);
+        let mut stiffness = vec![0.0; of.len()];
+        self.terms.iter().for_each(|term| term.add_penalties(self.at(), &mut stiffness));
+        if let Some(following) = &self.following {
+            following.loads.add_penalties(&mut stiffness);
+        }
+        let mut ties = Ties::default();
+        if !world.any(stiffness.iter().any(|&k| k > 0.0)) {
+            return Ok(ties);
+        }
+        of.halo.reverse_add(world, &mut stiffness, 1)?;
+        ties.nodes = vec![false; of.owned];
+        for (row, tied) in ties.nodes.iter_mut().enumerate() {
+            Rows::<D>::visit(rows, row, |column, block| {
+                if column == row {
+                    let all: f64 = (0..D).map(|i| block[i][i]).sum();
+                    *tied = stiffness[row] > TIED * all;
+                }
+            });
+        }
+        if self.symmetric() {
+            return Ok(ties);
+        }
+        self.terms.iter().for_each(|term| term.correct_surrogate(self.at(), &mut ties.corrections));
+        // Held rows and columns are those of the identity.
+        for (a, b, block) in &mut ties.corrections {
+            let held = |node: u32, i: usize| self.held.holds(node as usize * D + i);
+            for (i, line) in block.iter_mut().enumerate() {
+                for (j, value) in line.iter_mut().enumerate() {
+                    if held(*a, i) || held(*b, j) {
+                        *value = 0.0;
+                    }
+                }
+            }
+        }
+        Ok(ties)
+    }
+}
