@@ -80,7 +80,7 @@ fn extreme<'a, const D: usize>(
     way: &[f64; D],
     sign: f64,
 ) -> Option<&'a [f64; D]> {
-    cloud.iter().max_by(|x, y| (sign * dot(*x, way)).total_cmp(&(sign * dot(*y, way))))
+    cloud.iter().max_by(|x, y| (sign * dot(x, way)).total_cmp(&(sign * dot(y, way))))
 }
 
 /// Shares, of sum one, of the vectors in the shortest vector of the flat through them: those of

@@ -227,7 +227,7 @@ impl PointField {
             PointField::Jacobian => out.push(jacobian()),
             PointField::Volume => out.push(points.volume(p)),
             PointField::Mass => out.push(points.mass[p]),
-            PointField::ContactForce => out.extend(told::FORCE.map(|name| of_contact(name))),
+            PointField::ContactForce => out.extend(told::FORCE.map(&of_contact)),
             PointField::ContactGap => out.push(of_contact(told::GAP)),
             PointField::ContactSlip => out.push(of_contact(told::SLIP)),
             PointField::ContactStatus => out.push(of_contact(told::STATUS)),
