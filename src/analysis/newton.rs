@@ -179,9 +179,9 @@ fn solve_robustly<const D: usize>(
     let Some(stronger) = stronger.filter(|_| !outcome.converged) else {
         return Ok((outcome, None));
     };
-    let before = snes.ksp()?.describe()?;
+    let before = snes.ksp().describe()?;
     let mut snes = solver::newton(world, stronger, shape, null_pivots, most)?;
-    let after = snes.ksp()?.describe()?;
+    let after = snes.ksp().describe()?;
     if before == after {
         // The user's options chose both.
         return Ok((outcome, None));

@@ -62,6 +62,12 @@ impl Ksp {
         Ksp { raw, comm: comm.duplicate(), prefix: prefix.into(), matrix: 0 }
     }
 
+    /// Takes over one reference in place of none.
+    pub(crate) fn take_reference(&mut self, raw: sys::KSP) {
+        debug_assert!(self.raw.is_null(), "a solver is taken over once");
+        self.raw = raw;
+    }
+
     /// Built-in options under the prefix: pairs such as `("ksp_type", "cg")`. The user's win.
     /// Call before [`Self::set_from_options`].
     pub fn set_defaults<V: AsRef<str>>(&self, options: &[(&str, V)]) -> Result<()> {

@@ -105,6 +105,9 @@ pub struct Snes {
     matrix: u64,
     /// Tolerances of an iterative linear solver, unless one is fixed.
     forcing: Option<Forcing>,
+    /// The linear solver, once more. It is made with the owner: to make it takes all ranks, and in a
+    /// solve a rank may have left with an error of its own.
+    solver: Ksp,
 }
 
 /// What the callbacks see during one solve.
@@ -113,8 +116,7 @@ struct Context<'a, P> {
     matrix: &'a mut Matrix,
     comm: &'a SimpleCommunicator,
     forcing: Option<Forcing>,
-    /// The linear solver, once more.
-    solver: Ksp,
+    solver: &'a Ksp,
     error: Option<Error>,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
@@ -137,12 +139,17 @@ impl Snes {
     pub fn new(comm: &SimpleCommunicator, prefix: &str, max_solves: usize) -> Result<Self> {
         require_running()?;
         let comm = comm.duplicate();
-        let mut snes =
-            Snes { raw: null_mut(), comm, prefix: prefix.into(), matrix: 0, forcing: None };
+        let solver = Ksp::from_reference(null_mut(), &comm, prefix);
+        let (raw, prefix_text) = (null_mut(), prefix.into());
+        let mut snes = Snes { raw, comm, prefix: prefix_text, matrix: 0, forcing: None, solver };
         petsc!(SNESCreate(snes.comm.as_raw(), &mut snes.raw))?;
         let prefix = c_text(prefix)?;
         petsc!(SNESSetOptionsPrefix(snes.raw, prefix.as_ptr()))?;
         petsc!(SNESSetType(snes.raw, sys::SNESNEWTONLS.as_ptr().cast()))?;
+        let mut inner = null_mut();
+        petsc!(SNESGetKSP(snes.raw, &mut inner))?;
+        petsc!(PetscObjectReference(inner.cast()))?;
+        snes.solver.take_reference(inner);
         let mut search = null_mut();
         petsc!(SNESGetLineSearch(snes.raw, &mut search))?;
         // Every version knows this word; the constant with it has changed its name.
@@ -177,11 +184,8 @@ impl Snes {
     }
 
     /// The linear solver inside: tolerances, reuse of the preconditioner, description.
-    pub fn ksp(&self) -> Result<Ksp> {
-        let mut inner = null_mut();
-        petsc!(SNESGetKSP(self.raw, &mut inner))?;
-        petsc!(PetscObjectReference(inner.cast()))?;
-        Ok(Ksp::from_reference(inner, &self.comm, &self.prefix))
+    pub fn ksp(&self) -> &Ksp {
+        &self.solver
     }
 
     /// Collective. Iterates from `x` to a solution, left in `x`. Not converging is an outcome;
@@ -202,7 +206,7 @@ impl Snes {
             matrix,
             comm: &self.comm,
             forcing: self.forcing.clone(),
-            solver: self.ksp()?,
+            solver: &self.solver,
             error: None,
             diverged: None,
             outside: false,
@@ -380,7 +384,7 @@ unsafe extern "C" fn before_solve<P: NewtonProblem>(
         .and_then(|mut rhs| context.problem.before_solve(&mut rhs));
     context.agree_on(result, |context, ()| {
         let earlier = context.linear_solves;
-        context.problem.prepare_solver(&context.solver, context.matrix, earlier)?;
+        context.problem.prepare_solver(context.solver, context.matrix, earlier)?;
         let Some(forcing) = &mut context.forcing else { return Ok(()) };
         let (mut norm, default) = (0.0, DEFAULT as f64);
         petsc!(VecNorm(rhs, sys::NORM_2, &mut norm))?;
