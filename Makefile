@@ -40,8 +40,9 @@ install: build
 	@case ":$$PATH:" in *":$(PREFIX)/bin:"*) ;; \
 		*) echo "$(PREFIX)/bin is not on the PATH: export PATH=$(PREFIX)/bin:\$$PATH" ;; esac
 
+# Most tests wait for ranks to come and go: more of them than cores.
 test: setup
-	cargo test --release
+	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$((2 * $$(nproc)))} cargo test --release
 
 bench: setup
 	cargo bench --bench kernels

@@ -1,14 +1,14 @@
-//! Runs things under `mpirun` from ordinary tests, with a time limit and one job at a time.
+//! Runs things under `mpirun` from ordinary tests, with a time limit, and not too many at a time.
 #![allow(dead_code)]
 
 pub mod left;
 pub mod product;
+pub mod room;
 pub mod run;
 pub mod validation;
 
 use std::ffi::OsStr;
 use std::process::{Command, Output, Stdio};
-use std::sync::Mutex;
 
 use mpi::environment::Universe;
 
@@ -28,11 +28,10 @@ const OPEN_MPI: [(&str, &str); 8] = [
 ];
 /// Set in the ranks of [`on_ranks`].
 const INSIDE: &str = "MPM_PAR_TEST_RANK";
-static ONE_JOB: Mutex<()> = Mutex::new(());
 
 /// Runs `command` (program, then its arguments) on `n` ranks with extra environment variables.
 pub fn mpirun<S: AsRef<OsStr>>(n: usize, command: &[S], env: &[(&str, &str)]) -> Output {
-    let _alone = ONE_JOB.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let _room = room::Room::take(n);
     let mut job = job(n, TIME_LIMIT);
     job.args(command).envs(env.iter().copied());
     job.output().expect("mpirun is on the PATH")

@@ -3,41 +3,14 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::Output;
-use std::sync::{Condvar, Mutex};
 
 use tempfile::TempDir;
 
+use super::room::Room;
 use super::{job, left};
 
 /// Seconds after which `mpirun` kills a job: a deadlock fails instead of hanging.
 const TIME_LIMIT: u32 = 900;
-/// Ranks that run at the same time, over all tests of this executable.
-const CORES: usize = 2;
-
-static BUSY: Mutex<usize> = Mutex::new(0);
-static FREED: Condvar = Condvar::new();
-
-/// A share of the cores, given back when dropped.
-struct Cores(usize);
-
-impl Cores {
-    fn take(ranks: usize) -> Self {
-        let wanted = ranks.min(CORES);
-        let mut busy = BUSY.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        while *busy + wanted > CORES {
-            busy = FREED.wait(busy).unwrap_or_else(|poisoned| poisoned.into_inner());
-        }
-        *busy += wanted;
-        Cores(wanted)
-    }
-}
-
-impl Drop for Cores {
-    fn drop(&mut self) {
-        *BUSY.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) -= self.0;
-        FREED.notify_all();
-    }
-}
 
 /// `inputs/NAME.toml` of this project.
 pub fn input(name: &str) -> PathBuf {
@@ -158,7 +131,7 @@ impl Run {
     }
 
     fn start(&self, folder: &Path, arguments: &[String]) -> Output {
-        let _cores = Cores::take(self.ranks);
+        let _room = Room::take(self.ranks);
         let mut job = job(self.ranks, self.limit);
         job.arg(env!("CARGO_BIN_EXE_mpm-par")).args(arguments).current_dir(folder);
         // After a run that failed mpirun waits so long for ranks that are gone already, s.
