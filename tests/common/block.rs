@@ -3,6 +3,7 @@
 
 use mpm_par::amg::level::{BlockCsr, Nodes};
 use mpm_par::parallel::{HaloPlan, World};
+use mpm_par::petsc::Index;
 
 /// A block of `cells` bilinear or trilinear elements of side 1, E = 1, nu = 0.3.
 #[derive(Clone, Copy)]
@@ -149,8 +150,8 @@ impl<const D: usize> Block<D> {
             .collect();
         ghosts.sort_unstable();
         ghosts.dedup();
-        let global: Vec<i32> =
-            own.clone().chain(ghosts.iter().map(|g| g.1)).map(|node| node as i32).collect();
+        let global: Vec<Index> =
+            own.clone().chain(ghosts.iter().map(|g| g.1)).map(|node| node as Index).collect();
         let local = |node: usize| {
             let ghost = || own.len() + ghosts.partition_point(|g| g.1 < node);
             if own.contains(&node) { node - own.start } else { ghost() }
@@ -166,11 +167,11 @@ impl<const D: usize> Block<D> {
         let halo = HaloPlan::build(world, own.len(), &ghosts, |node| {
             own.contains(&node).then(|| node - own.start)
         });
-        let position = |&node: &i32| {
+        let position = |&node: &Index| {
             let place = self.place(node as usize);
             std::array::from_fn(|k| place.get(k).map_or(0.0, |&n| n as f64))
         };
-        let key = |&node: &i32| (f64::from(node) * 0.618_033_988_749_895).fract() + 1e-9;
+        let key = |&node: &Index| (node as f64 * 0.618_033_988_749_895).fract() + 1e-9;
         let nodes = Nodes {
             owned: own.len(),
             position: global.iter().map(position).collect(),

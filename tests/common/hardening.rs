@@ -8,7 +8,7 @@ use mpm_par::amg::{self, Hierarchy, Levelled, Levels};
 use mpm_par::blocks::BlockProduct;
 use mpm_par::error::Result;
 use mpm_par::parallel::World;
-use mpm_par::petsc::{Ksp, Matrix, NewtonProblem, Snes, Verdict};
+use mpm_par::petsc::{Index, Ksp, Matrix, NewtonProblem, Snes, Verdict};
 
 use super::block::{Block, Share};
 
@@ -46,7 +46,7 @@ impl<const D: usize> Hardening<'_, D> {
     }
 
     /// Scalar rows of blocks: offsets, global columns, values.
-    fn scalars(&self, rows: &BlockCsr<D>) -> (Vec<i32>, Vec<i32>, Vec<f64>) {
+    fn scalars(&self, rows: &BlockCsr<D>) -> (Vec<Index>, Vec<Index>, Vec<f64>) {
         let (mut offsets, mut columns, mut values) = (vec![0], Vec::new(), Vec::new());
         for row in 0..self.share.nodes.owned {
             let range = rows.offsets[row]..rows.offsets[row + 1];
@@ -55,10 +55,10 @@ impl<const D: usize> Hardening<'_, D> {
             order.sort_unstable_by_key(|&k| number(k));
             for r in 0..D {
                 for &k in &order {
-                    columns.extend((0..D as i32).map(|s| number(k) * D as i32 + s));
+                    columns.extend((0..D as Index).map(|s| number(k) * D as Index + s));
                     values.extend_from_slice(&rows.values[k][r]);
                 }
-                offsets.push(columns.len() as i32);
+                offsets.push(columns.len() as Index);
             }
         }
         (offsets, columns, values)
