@@ -11,11 +11,13 @@ const PETSC_NAMES: [&str; 2] = ["petsc", "PETSc"];
 /// The first that serves, and the first that nobody has tried.
 const PETSC_VERSIONS: (&str, &str) = ("3.18", "3.27");
 /// Differences between versions of PETSc, read off the bindings: the flag that `src/petsc/sys.rs` asks
-/// for, the beginning of a declaration, and what stands in it where the flag is set.
-const DIFFERENCES: [(&str, &str, &str); 3] = [
+/// for, the beginning of a declaration, and what stands in it where the flag is set. Where the type has a
+/// name, it is the name's own declaration that tells: the name stays and what it means changes.
+const DIFFERENCES: [(&str, &str, &str); 4] = [
     ("petsc_bool", "pub type PetscBool ", "bool"),
-    ("petsc_any_function_returns", "pub fn MatShellSetOperation(", "PetscErrorCodeFn"),
+    ("petsc_any_function_returns", "pub type PetscErrorCodeFn ", "->"),
     ("petsc_destroys_by_place", "pub fn MatShellSetContextDestroy(", "PetscCtxDestroyFn"),
+    ("petsc_place_is_opaque", "pub type PetscCtxDestroyFn ", "PetscCtxRt"),
 ];
 
 fn main() {

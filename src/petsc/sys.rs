@@ -29,8 +29,11 @@ pub type AnyFunction = unsafe extern "C" fn() -> PetscErrorCode;
 #[cfg(not(petsc_any_function_returns))]
 pub type AnyFunction = unsafe extern "C" fn();
 
-/// What the destructor of a context is given: its address, or since PETSc 3.23 the place of that.
-#[cfg(petsc_destroys_by_place)]
+/// What the destructor of a context is given: its address, or since PETSc 3.23 the place of that,
+/// which later releases declare as a pointer to anything.
+#[cfg(petsc_place_is_opaque)]
+pub type Destroyed = PetscCtxRt;
+#[cfg(all(petsc_destroys_by_place, not(petsc_place_is_opaque)))]
 pub type Destroyed = *mut *mut c_void;
 #[cfg(not(petsc_destroys_by_place))]
 pub type Destroyed = *mut c_void;
@@ -42,7 +45,7 @@ pub type Destroyed = *mut c_void;
 pub unsafe fn destroyed(given: Destroyed) -> *mut c_void {
     #[cfg(petsc_destroys_by_place)]
     // SAFETY: the caller's promise.
-    return unsafe { *given };
+    return unsafe { *given.cast::<*mut c_void>() };
     #[cfg(not(petsc_destroys_by_place))]
     given
 }
