@@ -9,6 +9,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
+use common::at_once::at_once;
 use common::mpirun;
 use mpm_par::output::restart::seal::Checksum;
 use program::*;
@@ -21,14 +22,14 @@ fn any_number_of_ranks_continues_any_other() {
     let folder = tempfile::tempdir().unwrap();
     let deck = deck("restart");
     let at = |name: String| folder.path().join(name);
-    for wrote in RANKS {
+    at_once(RANKS, |wrote| {
         run_well(wrote, &deck, &at(format!("whole-{wrote}")), &[]);
-    }
+    });
     let reference = points_of(&at("whole-1".into()).join("checkpoint-000006.h5"));
-    for wrote in RANKS {
+    at_once(RANKS, |wrote| {
         let whole = at(format!("whole-{wrote}"));
         let middle = whole.join("checkpoint-000003.h5");
-        for goes_on in RANKS {
+        at_once(RANKS, |goes_on| {
             let part = at(format!("part-{wrote}-{goes_on}"));
             run_well(goes_on, &deck, &part, &["--restart", &middle.display().to_string()]);
             let end = points_of(&part.join("checkpoint-000006.h5"));
@@ -43,8 +44,8 @@ fn any_number_of_ranks_continues_any_other() {
                 assert_eq!(difference(&whole_end, &end).0, 0.0, "{wrote} ranks: not bit by bit");
                 assert_eq!(rows[..], history(&whole)[3..]);
             }
-        }
-    }
+        });
+    });
 }
 
 /// In its own directory a run goes on as one: tables and series are those of a run in one piece.
@@ -93,13 +94,16 @@ fn a_moved_mesh_is_restored() {
 #[test]
 fn damaged_checkpoints_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("out");
+    let good_out = folder.path().join("out");
     let deck = deck("restart");
-    run_well(1, &deck, &out, &["--set", "output.checkpoint={every=2,keep=9}"]);
-    let newest = out.join("checkpoint-000006.h5");
-    let good = fs::read(&newest).unwrap();
+    run_well(1, &deck, &good_out, &["--set", "output.checkpoint={every=2,keep=9}"]);
+    let good = fs::read(good_out.join("checkpoint-000006.h5")).unwrap();
     let size = good.len();
-    let refuse = |bytes: &[u8], what: &str| {
+    let refuse = |(bytes, what): (Vec<u8>, String)| {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("out");
+        copy(&good_out, &out);
+        let newest = out.join("checkpoint-000006.h5");
         fs::write(&newest, bytes).unwrap();
         let before = contents(&out);
         let output = run(1, &deck, &out, &["--restart", &newest.display().to_string(), "--force"]);
@@ -108,16 +112,20 @@ fn damaged_checkpoints_are_refused() {
         assert!(contents(&out) == before, "{what}: something was changed");
     };
     // A bit in the superblock, in a header, in the middle, in the seal; and the file cut short.
+    let mut cases = vec![([&good[..], b"x"].concat(), "one byte more".to_owned())];
     for place in [0, 9, 100, size / 3, size / 2, size - 50, size - 1] {
         let mut bytes = good.clone();
         bytes[place] ^= 0x10;
-        refuse(&bytes, &format!("bit at {place} of {size}"));
+        cases.push((bytes, format!("bit at {place} of {size}")));
     }
     for length in [0, 10, size / 2, size - 48, size - 1] {
-        refuse(&good[..length], &format!("{length} of {size} bytes"));
+        cases.push((good[..length].to_vec(), format!("{length} of {size} bytes")));
     }
-    refuse(&[&good[..], b"x"].concat(), "one byte more");
+    at_once(cases, refuse);
 
+    let out = good_out;
+    let newest = out.join("checkpoint-000006.h5");
+    fs::write(&newest, [&good[..], b"x"].concat()).unwrap();
     // The newest is damaged now: the one before it is taken, and this is said.
     let output = run_well(1, &deck, &out, &["--restart", "last"]);
     let said = text(&output);

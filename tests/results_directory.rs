@@ -8,7 +8,9 @@ mod program;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::atomic::{AtomicBool, Ordering};
 
+use common::at_once::at_once;
 use common::mpirun;
 use program::*;
 
@@ -297,30 +299,36 @@ fn rows_reach_the_disk_before_their_checkpoint() {
 fn a_deck_in_its_results_directory_is_never_lost() {
     let folder = tempfile::tempdir().unwrap();
     let library = between(folder.path());
-    let (good, out) = (folder.path().join("good"), folder.path().join("results"));
+    let good = folder.path().join("good");
     let short = ["--set", "analysis.steps=1", "--set", "output.checkpoint="];
     run_well(1, &deck("restart"), &good, &short);
-    for name in ["input.toml", "resolved.toml"] {
+    at_once(["input.toml", "resolved.toml"], |name| {
         let text = fs::read(good.join(name)).unwrap();
-        for at in 1.. {
-            let _ = fs::remove_dir_all(&out);
-            copy(&good, &out);
-            let env = [("LD_PRELOAD", library.as_str()), ("KILL_AT", &at.to_string())];
-            // Another deck than the last one's, so that both copies change.
-            let more = [&short[..], &["--force", "--set", "title=again"]].concat();
-            let output = mpirun(1, &words(&out.join(name), &out, &more, 1), &env);
-            let kept = ["input.toml", "resolved.toml"].map(|name| fs::read(out.join(name)).ok());
-            let whole = kept.contains(&Some(text.clone()));
-            assert!(whole, "{name} is lost when killed at {at}: {}", self::text(&output));
-            assert!(kept[usize::from(name == "resolved.toml")].is_some(), "{name}, {at}");
-            // The new log comes after the decks.
-            let removed = !out.join("summary.json").exists();
-            if removed && out.join("log.txt").exists() {
-                assert!(at > 5, "only {at} moments");
-                break;
-            }
+        let ended = AtomicBool::new(false);
+        for first in (1..200).step_by(4).take_while(|_| !ended.load(Ordering::Relaxed)) {
+            at_once(first..first + 4, |at| {
+                let out = folder.path().join(format!("{name}-{at}/results"));
+                fs::create_dir_all(out.parent().unwrap()).unwrap();
+                copy(&good, &out);
+                let env = [("LD_PRELOAD", library.as_str()), ("KILL_AT", &at.to_string())];
+                // Another deck than the last one's, so that both copies change.
+                let more = [&short[..], &["--force", "--set", "title=again"]].concat();
+                let output = mpirun(1, &words(&out.join(name), &out, &more, 1), &env);
+                let kept =
+                    ["input.toml", "resolved.toml"].map(|name| fs::read(out.join(name)).ok());
+                let whole = kept.contains(&Some(text.clone()));
+                assert!(whole, "{name} is lost when killed at {at}: {}", self::text(&output));
+                assert!(kept[usize::from(name == "resolved.toml")].is_some(), "{name}, {at}");
+                // The new log comes after the decks.
+                let removed = !out.join("summary.json").exists();
+                if removed && out.join("log.txt").exists() {
+                    assert!(at > 5, "only {at} moments");
+                    ended.store(true, Ordering::Relaxed);
+                }
+            });
         }
-    }
+        assert!(ended.into_inner(), "{name}: no run ended in 200 moments");
+    });
 }
 
 /// A restart from an early checkpoint gives up what came later: its frames do not lie beside those of

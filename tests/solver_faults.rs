@@ -4,6 +4,7 @@
 
 mod common;
 
+use common::at_once::at_once;
 use common::left;
 use common::run::Run;
 
@@ -80,29 +81,30 @@ fn a_singular_system_fails_in_blocks_and_under_multigrid_too() {
         "DIVERGED_PC_FAILED (zero pivot: the matrix is singular) after 0 iterations",
         "DIVERGED_DTOL after 1 iterations",
     );
-    for (words, message) in [
+    let cases = [
         ("-qs_ksp_type preonly -qs_pc_type bjacobi -qs_sub_pc_type lu", SINGULAR),
         ("-qs_ksp_type cg -qs_pc_type bjacobi -qs_sub_pc_type lu", SINGULAR),
         ("-qs_ksp_type preonly -qs_pc_type redundant", SINGULAR),
         ("-qs_ksp_type cg -qs_pc_type mg -qs_ksp_max_it 40", &run_away),
-    ] {
+    ];
+    at_once(cases, |(words, message)| {
         for ranks in [2, 3] {
             let run = words.split(' ').fold(loose_piece(), |run, word| run.word(word));
             let outcome = run.ranks(ranks).attempt();
             assert_eq!(outcome.said(), message, "{words} on {ranks} ranks");
             assert_eq!(outcome.code, 1, "{words} on {ranks} ranks");
         }
-    }
+    });
 }
 
 #[test]
 fn nonlinear_solvers_that_do_not_suit() {
-    for kind in ["ksponly", "qn", "aspin", "nrichardson"] {
+    at_once(["ksponly", "qn", "aspin", "nrichardson"], |kind| {
         let message = format!(
             "error: -qs_snes_type {kind}: the equations are solved by newtonls or newtontr"
         );
         refused_on(&[1, 2], &with(&format!("-qs_snes_type {kind}")), &message);
-    }
+    });
     refused(
         &block().set("petsc={ qs_snes_type = \"qn\" }"),
         "error: -qs_snes_type qn: the equations are solved by newtonls or newtontr",
@@ -230,8 +232,9 @@ fn files_that_fail_at_the_start_and_at_the_end() {
 /// PETSc opens a file on one rank only, and the others go on to an exchange with it.
 #[test]
 fn files_that_fail_in_a_step() {
-    for words in ["-qs_snes_monitor :link", "-qs_ksp_converged_reason :link"] {
-        for ranks in [1, 2, 3] {
+    let words = ["-qs_snes_monitor :link", "-qs_ksp_converged_reason :link"];
+    at_once(words, |words| {
+        at_once([1, 2, 3], |ranks| {
             let folder = tempfile::tempdir().unwrap();
             std::os::unix::fs::symlink("nowhere/x", folder.path().join("link")).unwrap();
             let outcome = with(words).ranks(ranks).attempt_in(folder);
@@ -241,8 +244,8 @@ fn files_that_fail_in_a_step() {
             assert!(first.contains(expected), "{words} on {ranks} ranks: {text}");
             assert_eq!(text.matches(expected).count(), 1, "{words} on {ranks} ranks: {text}");
             assert_eq!(outcome.code, 4, "{words} on {ranks} ranks");
-        }
-    }
+        });
+    });
 }
 
 /// A step whose residual is round-off of its own terms ends as converged, and says so where the

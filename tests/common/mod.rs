@@ -1,6 +1,7 @@
 //! Runs things under `mpirun` from ordinary tests, with a time limit, and not too many at a time.
 #![allow(dead_code)]
 
+pub mod at_once;
 pub mod left;
 pub mod product;
 pub mod room;

@@ -2,6 +2,7 @@
 //! result hardly depend on their number.
 
 use super::blocks::blocks;
+use crate::common::at_once::at_once;
 use crate::common::run::{Run, relative_difference};
 
 /// A block off the grid lines that shakes in all directions, `cells` wide.
@@ -32,7 +33,7 @@ fn shaken(dimension: usize, basis: &str, cells: usize) -> Run {
 
 #[test]
 fn more_ranks_hardly_take_more() {
-    for (dimension, basis, cells) in [(2, "mpm", 60), (2, "gimp", 60), (3, "mpm", 12)] {
+    at_once([(2, "mpm", 60), (2, "gimp", 60), (3, "mpm", 12)], |(dimension, basis, cells)| {
         let run = shaken(dimension, basis, cells);
         let one = run.results();
         let count = |iterations: &[f64]| iterations.iter().sum::<f64>();
@@ -52,5 +53,5 @@ fn more_ranks_hardly_take_more() {
                 assert!(difference < 1e-12, "{basis} in {dimension}D: {field} {difference:e}");
             }
         }
-    }
+    });
 }

@@ -2,6 +2,7 @@
 
 use super::blocks::blocks;
 use super::ghosts::contact;
+use crate::common::at_once::at_once;
 use crate::common::run::{Results, Run, relative_difference};
 
 #[track_caller]
@@ -46,12 +47,13 @@ fn explicit_lumped_plastic() {
 fn explicit_with_ranks_all_border_and_without_points() {
     let body = "name = \"block\"\nshape = { box = { min = [1.1, 1.1], max = [3.2, 4.3] } }\n\
                 points_per_cell = [2, 2]\nvelocity = ['0.3*Y', '0.2*sin(X)']";
-    for (basis, mass, update) in [
+    let cases = [
         ("mpm", "lumped", "usl"),
         ("gimp", "lumped", "usf"),
         ("mpm", "consistent", "musl"),
         ("cpdi2", "consistent", "usl"),
-    ] {
+    ];
+    at_once(cases, |(basis, mass, update)| {
         let run = blocks(&[body])
             .set(format!("method.basis=\"{basis}\""))
             .set(format!("method.mass=\"{mass}\""))
@@ -71,7 +73,7 @@ fn explicit_with_ranks_all_border_and_without_points() {
                 assert!(difference < 1e-12, "{basis} {mass} {ranks}: {field} {difference:e}");
             }
         }
-    }
+    });
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! The same answer from every frame, on any number of ranks, again, and from any side.
 
+use crate::common::at_once::at_once;
 use crate::common::run::{Results, Run, relative_difference};
 
 /// Stabilised beam, far into the large rotation; elasto-plastic collapse, where points cross
@@ -38,11 +39,11 @@ fn frames_agree() {
 
 #[test]
 fn ranks_agree() {
-    for (run, step) in [(beam(), 25), (collapse(), 40)] {
+    at_once([(beam(), 25), (collapse(), 40)], |(run, step)| {
         // Small bricks: every rank gets some, and Ghost faces lie between ranks.
         let run = run.set("parallel.brick=1");
         let alone = run.clone().results();
-        for ranks in [2, 3, 4, 7] {
+        at_once([2, 3, 4, 7], |ranks| {
             let many = run.clone().ranks(ranks).results();
             assert_alike(&many, &alone, step, 1e-8, &format!("{ranks} ranks"));
             assert_eq!(many.count("ranks"), ranks);
@@ -58,8 +59,8 @@ fn ranks_agree() {
                 let off = relative_difference(&many.history(column), &alone.history(column));
                 assert!(off < 1e-8, "{column}, {ranks} ranks: {off:e}");
             }
-        }
-    }
+        });
+    });
 }
 
 #[test]
