@@ -11,13 +11,12 @@ const PETSC_NAMES: [&str; 2] = ["petsc", "PETSc"];
 /// The first that serves, and the first that nobody has tried.
 const PETSC_VERSIONS: (&str, &str) = ("3.18", "3.27");
 /// Differences between versions of PETSc, read off the bindings: the flag that `src/petsc/sys.rs` asks
-/// for, the beginning of a declaration, and what stands in it where the flag is set. Where the type has a
-/// name, it is the name's own declaration that tells: the name stays and what it means changes.
+/// for, the beginning of a declaration, and what stands in its meaning where the flag is set.
 const DIFFERENCES: [(&str, &str, &str); 4] = [
-    ("petsc_bool", "pub type PetscBool ", "bool"),
-    ("petsc_any_function_returns", "pub type PetscErrorCodeFn ", "->"),
-    ("petsc_destroys_by_place", "pub fn MatShellSetContextDestroy(", "PetscCtxDestroyFn"),
-    ("petsc_place_is_opaque", "pub type PetscCtxDestroyFn ", "PetscCtxRt"),
+    ("petsc_bool", "pub type PetscBool ", "= bool"),
+    ("petsc_any_function_returns", "pub fn MatShellSetOperation(", "fn() ->"),
+    ("petsc_destroys_by_place", "pub fn MatShellSetContextDestroy(", "*mut *mut"),
+    ("petsc_place_is_opaque", "pub fn MatShellSetContextDestroy(", "PetscCtxRt"),
 ];
 
 fn main() {
@@ -96,8 +95,7 @@ fn main() {
     let text = bindings.to_string();
     for (flag, declaration, word) in DIFFERENCES {
         println!("cargo:rustc-check-cfg=cfg({flag})");
-        let declared = text.find(declaration).map(|at| &text[at..]).unwrap_or_default();
-        if declared.split(';').next().is_some_and(|declared| declared.contains(word)) {
+        if meaning(&text, declaration).contains(word) {
             println!("cargo:rustc-cfg={flag}");
         }
     }
@@ -105,6 +103,23 @@ fn main() {
     bindings
         .write_to_file(&out)
         .unwrap_or_else(|error| panic!("cannot write {}: {error}", out.display()));
+}
+
+/// The declaration that begins so, and after it those of the types it names: a version may give a type a
+/// name, and a later one the name another meaning.
+fn meaning(text: &str, beginning: &str) -> String {
+    let declaration = |beginning: &str| {
+        let from = text.find(beginning).map(|at| &text[at..]).unwrap_or_default();
+        let words = from.split(';').next().unwrap_or_default().split_whitespace();
+        words.collect::<Vec<&str>>().join(" ")
+    };
+    let mut all = declaration(beginning);
+    for word in all.clone().split(|c: char| !c.is_alphanumeric() && c != '_') {
+        if word.starts_with("Petsc") {
+            all += &format!(" {}", declaration(&format!("pub type {word} ")));
+        }
+    }
+    all
 }
 
 /// Name and version of a PETSc that is there and does not suit.

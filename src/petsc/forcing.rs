@@ -88,10 +88,12 @@ pub(crate) fn set_default(snes: sys::SNES) -> Result<()> {
 const TRUE_NORM: [&str; 4] = ["cg", "gmres", "fgmres", "bcgs"];
 
 /// The rule that the options ask for, if the linear solver iterates. A `ksp_rtol` given by the
-/// user is a fixed tolerance, unless `snes_ksp_ew` is given too.
+/// user is a fixed tolerance, unless `snes_ksp_ew` is given too. PETSc's own rule is off from here on:
+/// newer versions have hooks of their own for it, and would set their tolerances over ours.
 pub(crate) fn chosen(snes: sys::SNES, prefix: &str) -> Result<Option<Forcing>> {
     let (mut inner, mut kind, mut used) = (null_mut(), null(), sys::PETSC_FALSE);
     petsc!(SNESKSPGetUseEW(snes, &mut used))?;
+    petsc!(SNESKSPSetUseEW(snes, sys::PETSC_FALSE))?;
     petsc!(SNESGetKSP(snes, &mut inner))?;
     petsc!(KSPGetType(inner, &mut kind))?;
     let fixed = options::is_users(&format!("{prefix}ksp_rtol"))?

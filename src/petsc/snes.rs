@@ -155,7 +155,6 @@ impl Snes {
         // Every version knows this word; the constant with it has changed its name.
         petsc!(SNESLineSearchSetType(search, c"basic".as_ptr()))?;
         snes.set_max_solves(max_solves)?;
-        forcing::set_default(snes.raw)?;
         Ok(snes)
     }
 
@@ -178,6 +177,7 @@ impl Snes {
 
     /// Reads the options under the prefix, those of the linear solver included.
     pub fn set_from_options(&mut self) -> Result<()> {
+        forcing::set_default(self.raw)?;
         petsc!(SNESSetFromOptions(self.raw)).map_err(|error| unless_shared(&self.comm, error))?;
         self.forcing = forcing::chosen(self.raw, &self.prefix)?;
         Ok(())

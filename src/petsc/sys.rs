@@ -33,9 +33,9 @@ pub type AnyFunction = unsafe extern "C" fn();
 /// which later releases declare as a pointer to anything.
 #[cfg(petsc_place_is_opaque)]
 pub type Destroyed = PetscCtxRt;
-#[cfg(all(petsc_destroys_by_place, not(petsc_place_is_opaque)))]
+#[cfg(petsc_destroys_by_place)]
 pub type Destroyed = *mut *mut c_void;
-#[cfg(not(petsc_destroys_by_place))]
+#[cfg(not(any(petsc_place_is_opaque, petsc_destroys_by_place)))]
 pub type Destroyed = *mut c_void;
 
 /// The context in a destructor's argument.
@@ -43,9 +43,9 @@ pub type Destroyed = *mut c_void;
 /// # Safety
 /// `given` is what PETSc called the destructor with.
 pub unsafe fn destroyed(given: Destroyed) -> *mut c_void {
-    #[cfg(petsc_destroys_by_place)]
+    #[cfg(any(petsc_place_is_opaque, petsc_destroys_by_place))]
     // SAFETY: the caller's promise.
     return unsafe { *given.cast::<*mut c_void>() };
-    #[cfg(not(petsc_destroys_by_place))]
+    #[cfg(not(any(petsc_place_is_opaque, petsc_destroys_by_place)))]
     given
 }
