@@ -76,7 +76,7 @@ docs: setup
 
 # The picture of every template, by the program itself.
 gallery: build
-	sh jobs/gallery.sh
+	bash jobs/gallery.sh
 
 # Shell completions and the manual page below PREFIX.
 install-extras: install

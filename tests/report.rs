@@ -154,6 +154,61 @@ fn every_kind_of_run_has_one() {
     assert!(run.stdout.contains("warning: no report: cannot write"), "{}", run.stdout);
 }
 
+/// A million points, as `output` writes them: the page holds a sample, says so, and stays below 20 MB; a
+/// picture is drawn of all. Times are in docs/guide/results.md.
+#[test]
+fn a_million_points_fit_in_a_page() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("log.txt"), "").unwrap();
+    let count = 100 * 100 * 100;
+    let place = |id: usize| [id / 10_000, id / 100 % 100, id % 100].map(|k| k as f64 * 0.01);
+    let positions: Vec<f64> = (0..count).flat_map(place).collect();
+    let ids: Vec<u64> = (0..count as u64).collect();
+    for step in 0..3u64 {
+        let file = hdf5::File::create(out.join(format!("points-{step:06}.h5"))).unwrap();
+        let attribute = file.new_attr::<u64>().create("step").unwrap();
+        attribute.write_scalar(&step).unwrap();
+        file.new_attr::<f64>().create("time").unwrap().write_scalar(&(step as f64)).unwrap();
+        let write = |name: &str, values: &[f64]| {
+            let columns = values.len() / count;
+            let space = file.new_dataset::<f64>().shape((count, columns)).create(name).unwrap();
+            space.write_raw(values).unwrap();
+        };
+        write("position", &positions);
+        // The stress says which point it is of.
+        let stress: Vec<f64> = (0..6 * count).map(|k| (k / 6) as f64 + step as f64).collect();
+        write("stress", &stress);
+        file.new_dataset::<u64>().shape(count).create("id").unwrap().write_raw(&ids).unwrap();
+    }
+    let program = |words: &[&str]| {
+        let output = Command::new(env!("CARGO_BIN_EXE_mpm-par")).args(words).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    let directory = out.display().to_string();
+    program(&["report", &directory]);
+    let page = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(page.len() <= 20_000_000, "{} bytes", page.len());
+    let points = &data(&page)["points"];
+    assert_eq!((&points["all"], points["frames"].as_array().unwrap().len()), (&count.into(), 3));
+    let stride = points["stride"].as_u64().unwrap();
+    assert!(stride > 1, "{stride}");
+    let names = points["columns"].as_array().unwrap();
+    let at = names.iter().position(|column| column["name"] == "stress.yy").expect("a field");
+    let range = [0, 1].map(|k: usize| names[at]["range"][k].as_f64().unwrap());
+    let scale = (range[1] - range[0]) / 65534.0;
+    let shown = decoded(points["frames"][2]["values"][at].as_str().unwrap());
+    assert!(shown.len() >= 50_000, "{}", shown.len());
+    for (k, value) in shown.iter().enumerate() {
+        let id = k as f64 * stride as f64;
+        assert!((range[0] + scale * f64::from(*value) - id - 2.0).abs() <= scale, "{k}: {value}");
+    }
+    let picture = out.join("a.png").display().to_string();
+    program(&["plot", &directory, "--field", "stress.yy", "-o", &picture]);
+    assert!(std::fs::read(&picture).unwrap().starts_with(b"\x89PNG"));
+}
+
 /// A browser on this machine.
 fn browser() -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
