@@ -173,7 +173,7 @@ fn box_of(table: &Table<'_>) -> Got<(MeshSource, usize)> {
         let end = |last: bool| {
             axes.iter().map(|axis| axis[if last { axis.len() - 1 } else { 0 }][0]).collect()
         };
-        let cells = axes.iter().map(|axis| stations::lines(axis).len() - 1).collect();
+        let cells = axes.iter().map(|axis| stations::count_cells(axis)).collect();
         (end(false), end(true), cells, axes)
     } else {
         let (min, max) = super::shapes::corners(table, dimension, false)?;
