@@ -13,9 +13,9 @@
 //! the domain: Σ_c w_pc Σ_q V_q w_qc <∇N>_qc / Σ_q V_q w_qc. The functions of a cell are linear along
 //! each axis, so that moments of the parts give these means.
 
-use super::gimp::spans;
+use super::hats::spans;
 use super::product::for_each_index;
-use super::radial::pieces_of_rings;
+use super::radial::{Piece, pieces_of_rings};
 use super::{Groups, Influences, lattice_of};
 use crate::error::Result;
 use crate::grid::{Grid, Lattice};
@@ -82,17 +82,6 @@ pub(super) fn means<const D: usize, const N: usize>(
         }
     }
     means
-}
-
-/// A domain's part in a cell, along one axis.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Piece {
-    /// Of the domain, of rings by volume
-    pub share: f64,
-    /// Mean place in the cell, so weighted
-    pub place: f64,
-    /// Of rings along the radius: share of the area over the domain's radius, 1/m; and the plain mean place.
-    pub plain: [f64; 2],
 }
 
 /// The parts of point `p`'s domain along each axis, and the first cell of each.

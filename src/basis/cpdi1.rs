@@ -6,13 +6,70 @@
 //! corner values: d/dxi_j of corner c's function has the mean sgn_cj / 2^D, and d/dx = H^-T d/dxi
 //! because H is constant. In 2D, with s = 2 H_1 and t = 2 H_2, this is Rotation's formula.
 
+use crate::deck::model::DomainUpdate;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::grid::element::{determinant, inverse};
 use crate::grid::lattice::CORNER_SIGNS;
 use crate::points::Points;
+use crate::tensor::dense;
 
-use super::corner::{Corners, for_each_place};
+use super::contract::Basis;
+use super::corner::{self, Corners, for_each_place};
+use super::domain::{self, DomainStep};
+use super::{Influences, row};
+
+/// Parallelograms or parallelepipeds that follow F.
+pub struct Cpdi1;
+
+impl<const D: usize> Basis<D> for Cpdi1 {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        let mut hint = None;
+        row::map_points(points, |p, row| corners(points, p)?.fill(grid, points, p, &mut hint, row))
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        let corners = corner_positions(points, p);
+        corner::populated_cells(grid, points, p, &corners, hint, out)
+    }
+
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(corner_positions(points, p))
+    }
+
+    fn domains_deform(&self) -> bool {
+        true
+    }
+
+    fn check_domain(
+        &self,
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>> {
+        let increment = dense::plus_unit(&step.increments[p]);
+        check_step(step.grids[1], points, p, &increment, &step.moved[p], hint)?;
+        Ok(None)
+    }
+
+    fn update_domains(
+        &self,
+        _: DomainUpdate,
+        _: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_extents(points, corner_positions);
+        Ok(0)
+    }
+}
 
 /// H_0, m: column j is the half edge j of the domain before any deformation. It is read from
 /// the corners the point was seeded with, which `cpdi1` never moves (a sub-cell of a mesh gives

@@ -12,14 +12,66 @@
 //! map the diagonals exactly, and the area is half their cross product. Rotation's v_p is
 //! therefore [`Points::volume`]; in 3D the two differ at second order in the hexahedron's warp.
 
-use crate::deck::model::Element;
+use crate::deck::model::{DomainUpdate, Element};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::grid::element::{determinant, inverse, jacobian};
 use crate::grid::quadrature::gauss_rule;
 use crate::points::Points;
 
-use super::corner::{Corners, for_each_place};
+use super::contract::Basis;
+use super::corner::{self, Corners, for_each_place};
+use super::domain::{self, DomainStep};
+use super::{Influences, row};
+
+/// Quadrilaterals or hexahedra whose corners follow the nodes.
+pub struct Cpdi2;
+
+impl<const D: usize> Basis<D> for Cpdi2 {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        let mut hint = None;
+        row::map_points(points, |p, row| corners(points, p)?.fill(grid, points, p, &mut hint, row))
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        corner::populated_cells(grid, points, p, &points.corners[p], hint, out)
+    }
+
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(points.corners[p])
+    }
+
+    fn domains_deform(&self) -> bool {
+        true
+    }
+
+    fn check_domain(
+        &self,
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>> {
+        moved_corners(step.grids, points, p, hint, &|node| (step.nodal)(p, node)).map(Some)
+    }
+
+    fn update_domains(
+        &self,
+        _: DomainUpdate,
+        _: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_extents(points, |points, p| points.corners[p]);
+        Ok(0)
+    }
+}
 
 /// Volume (area in 2D) of a domain, m^D; negative if it is inside out.
 pub fn volume<const D: usize>(corners: &[[f64; D]; 8]) -> f64 {

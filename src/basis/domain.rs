@@ -17,8 +17,7 @@
 
 use nalgebra::Matrix3;
 
-use super::contract::DomainStep;
-use super::gimp::spans;
+use super::hats::spans;
 use super::lattice_of;
 use crate::deck::model::DomainUpdate;
 use crate::error::{Error, Result};
@@ -26,6 +25,21 @@ use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 use crate::tensor::dense;
 use crate::tensor::spectral::square_root;
+
+/// A step as the domains of the points see it.
+pub struct DomainStep<'a, const D: usize> {
+    /// The grid of the step, and that of the next.
+    pub grids: [&'a Grid<D>; 2],
+    /// dF - 1 of each point.
+    pub increments: &'a [[[f64; D]; D]],
+    /// Displacement of each point, m.
+    pub moved: &'a [[f64; D]],
+    /// Displacement, as a point sees it, of a node, m; zero where no equation lives. It is asked only
+    /// for nodes in the point's own row of [`super::contract::Basis::map_points`].
+    pub nodal: &'a dyn Fn(usize, usize) -> [f64; D],
+    /// The points are rings: axisymmetry.
+    pub rings: bool,
+}
 
 /// Half lengths of points without domains: half the side of a cube of the point's volume, or, with
 /// `rings`, of a square of the section's area A = V0 det F / (2π X F_zz).

@@ -4,7 +4,8 @@
 
 use nalgebra::Matrix3;
 
-use crate::basis::contract::{self, DomainStep};
+use crate::basis;
+use crate::basis::domain::DomainStep;
 use crate::basis::map_points;
 use crate::deck::model::{Basis, DomainUpdate, GimpEdge};
 use crate::error::Result;
@@ -49,7 +50,7 @@ fn update_domains<const D: usize>(
     let increments: Vec<_> = increments.iter().map(less_unit).collect();
     let (grids, moved, rings) = ([grid; 2], &[][..], false);
     let step = DomainStep { grids, increments: &increments, moved, nodal, rings };
-    contract::of_deck(basis, GimpEdge::Continued).update_domains(rule, &step, points)
+    basis::of_deck(basis, GimpEdge::Continued).update_domains(rule, &step, points)
 }
 
 /// One step from the unstrained state with the linear field u = (F - 1) X on the grid.

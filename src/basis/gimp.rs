@@ -1,164 +1,100 @@
 //! S_v = 1/(2 l_p) int N_v over [x_p - l_p, x_p + l_p], product over the axes (Ghost §2.5).
 //!
-//! The mean of a hat function over an interval is summed cell by cell, where the hat is linear:
-//! the share of the domain in the cell times the hat at the middle of that piece. This is exact
-//! for any half length and free of cancellation. Where a domain sticks out of the grid, the straight
-//! lines of the grid's outer cell go on beyond its edge: S sums to one and reproduces linear fields
-//! there too, so that no weight is lost. The formula alone would need the node beyond the edge; its
-//! share s^2 / (4 l_p h), s the length that sticks out, is given to the outer two nodes as 2 and -1.
-//!
-//! A cell is populated when it is overlapped along each axis; one that is only touched, to the
-//! rounding of the position, is not. The cell that holds the centre always counts. The row of a
+//! The means are those of `hats.rs`. A cell is populated when the domain overlaps it; the row of a
 //! point is exactly the nodes of its populated cells.
 
+use super::centre::{self, Moments, RowNodes};
+use super::contract::Basis;
+use super::domain::{self, DomainStep};
+use super::hats::{fill, spans};
 use super::product::{Line, for_each_index, push_row};
-use super::{Influences, lattice_of, outside};
-use crate::deck::model::GimpEdge;
-use crate::error::{Error, Result};
-use crate::grid::lattice::LINE_TOLERANCE;
-use crate::grid::{Grid, Lattice};
-use crate::points::Points;
+use super::{Influences, lattice_of, radial};
+use crate::deck::model::{DomainUpdate, GimpEdge};
+use crate::error::Result;
+use crate::grid::Grid;
+use crate::points::{Points, rectangle_corners};
 
-/// An overlap counts as touching up to this many roundings of the numbers it is computed from,
-/// and no more: what the roundings of many steps add up to is a true, if tiny, overlap, the very
-/// case that Ghost stabilisation is for (Ghost Figure 3).
-const ROUNDINGS: f64 = 4.0 * f64::EPSILON;
-/// Half length in cells below which a domain has vanished: its ends are no longer distinct.
-const SMALLEST_REACH: f64 = 1e-13;
-
-/// The first and last cell overlapped along one axis.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Span {
-    pub first: usize,
-    pub last: usize,
+/// Rectangular domains along the axes of a lattice.
+pub struct Gimp {
+    /// What a domain that reaches over the grid's edge meets there.
+    pub edge: GimpEdge,
 }
 
-impl Span {
-    /// Of the scaled interval [low, high] around `centre`, all in cells from the grid's origin;
-    /// overlaps up to `touch` do not count.
-    #[inline]
-    fn new(low: f64, centre: f64, high: f64, cells: usize, touch: f64) -> Self {
-        // Conversion to usize saturates: ends beyond the grid are clamped to it.
-        let home = (centre as usize).min(cells - 1);
-        let first = ((low + touch) as usize).min(home);
-        let last = ((high - touch).ceil() as usize).clamp(home + 1, cells) - 1;
-        Span { first, last }
-    }
-}
-
-/// The cells overlapped by the domain of point `p`, per axis.
-#[inline]
-pub(crate) fn spans<const D: usize>(
-    grid: &Grid<D>,
-    lattice: &Lattice<D>,
-    points: &Points<D>,
-    p: usize,
-) -> Result<[Span; D]> {
-    let (x, half) = (&points.position[p], &points.half_length[p]);
-    let mut spans = [Span { first: 0, last: 0 }; D];
-    for axis in 0..D {
-        let centre = lattice.scaled(axis, x[axis]);
-        let end = lattice.cells[axis] as f64;
-        if !(centre >= -LINE_TOLERANCE && centre <= end + LINE_TOLERANCE) {
-            return Err(outside(grid, points, p));
+impl<const D: usize> Basis<D> for Gimp {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        let lattice = lattice_of(grid)?;
+        let mut influences = Influences::with_capacity(points.len(), 3usize.pow(D as u32));
+        let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
+        for p in 0..points.len() {
+            let spans = spans(grid, lattice, points, p)?;
+            for axis in 0..D {
+                let centre = lattice.scaled(axis, points.position[p][axis]);
+                let reach = points.half_length[p][axis] / lattice.spacing[axis];
+                let (cells, spacing) = (lattice.cells[axis], lattice.spacing[axis]);
+                let end = (self.edge == GimpEdge::Published).then_some(cells);
+                fill(&mut lines[axis], spans[axis], centre, reach, spacing, end);
+            }
+            push_row(lattice, &lines, &mut influences);
         }
-        let reach = half[axis] / lattice.spacing[axis];
-        if !(reach > SMALLEST_REACH && reach.is_finite()) {
-            return Err(Error::Run(format!(
-                "point {} at {x:?} m has domain half lengths {half:?} m; each must be \
-                 positive, and not negligible against the cells",
-                points.id[p]
-            )));
-        }
-        let size = x[axis].abs() + lattice.origin[axis].abs() + half[axis];
-        let touch = ROUNDINGS * (size / lattice.spacing[axis]);
-        let (low, high) = (centre - reach, centre + reach);
-        spans[axis] = Span::new(low, centre, high, lattice.cells[axis], touch);
+        Ok(influences)
     }
-    Ok(spans)
-}
 
-pub(crate) fn map_points<const D: usize>(
-    grid: &Grid<D>,
-    edge: GimpEdge,
-    points: &Points<D>,
-) -> Result<Influences<D>> {
-    let lattice = lattice_of(grid)?;
-    let mut influences = Influences::with_capacity(points.len(), 3usize.pow(D as u32));
-    let mut lines: [Line; D] = std::array::from_fn(|_| Line::default());
-    for p in 0..points.len() {
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        _: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        let lattice = lattice_of(grid)?;
         let spans = spans(grid, lattice, points, p)?;
-        for axis in 0..D {
-            let centre = lattice.scaled(axis, points.position[p][axis]);
-            let reach = points.half_length[p][axis] / lattice.spacing[axis];
-            let (cells, spacing) = (lattice.cells[axis], lattice.spacing[axis]);
-            let end = (edge == GimpEdge::Published).then_some(cells);
-            fill(&mut lines[axis], spans[axis], centre, reach, spacing, end);
-        }
-        push_row(lattice, &lines, &mut influences);
+        for_each_index(&spans.map(|s| s.last - s.first + 1), |index| {
+            out.push(lattice.cell_at(std::array::from_fn(|a| spans[a].first + index[a])));
+        });
+        Ok(())
     }
-    Ok(influences)
-}
 
-pub(crate) fn populated_cells<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    out: &mut Vec<usize>,
-) -> Result<()> {
-    let lattice = lattice_of(grid)?;
-    let spans = spans(grid, lattice, points, p)?;
-    for_each_index(&spans.map(|s| s.last - s.first + 1), |index| {
-        out.push(lattice.cell_at(std::array::from_fn(|a| spans[a].first + index[a])));
-    });
-    Ok(())
-}
-
-/// Fills `line` with the means of the hats over [centre - reach, centre + reach], in cells.
-/// `published`: the cells of the grid, where the hats of its outermost nodes fall to zero beyond it.
-#[inline]
-pub(crate) fn fill(
-    line: &mut Line,
-    span: Span,
-    centre: f64,
-    reach: f64,
-    spacing: f64,
-    published: Option<usize>,
-) {
-    let last = span.last - span.first;
-    line.reset(span.first, last + 2);
-    // Distances are taken from the span's first node, so large grids cost no digits. The
-    // outermost pieces end where the domain ends: beyond an end that only round-off parts from a
-    // grid line, and beyond the grid's edge, the cell's straight lines go on.
-    let offset = centre - span.first as f64;
-    let (mut low, mut high) = (offset - reach, offset + reach);
-    let per_length = 1.0 / (high - low);
-    if let Some(cells) = published {
-        let edge = (last + 1) as f64;
-        if span.first == 0 && low < -LINE_TOLERANCE {
-            let share = low.max(-1.0).abs() * per_length;
-            let middle = 0.5 * low.max(-1.0);
-            line.weights[0] += share * (1.0 + middle);
-            line.slopes[0] += share / spacing;
-            low = 0.0;
-        }
-        if span.last + 1 == cells && high > edge + LINE_TOLERANCE {
-            let beyond = (high - edge).min(1.0);
-            let share = beyond * per_length;
-            let middle = 0.5 * beyond;
-            line.weights[last + 1] += share * (1.0 - middle);
-            line.slopes[last + 1] -= share / spacing;
-            high = edge;
-        }
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(rectangle_corners(points.position[p], points.half_length[p]))
     }
-    for cell in 0..=last {
-        let start = if cell == 0 { low } else { cell as f64 };
-        let end = if cell == last { high } else { (cell + 1) as f64 };
-        let share = (end - start) * per_length;
-        let middle = 0.5 * (start + end) - cell as f64;
-        line.weights[cell] += share * (1.0 - middle);
-        line.weights[cell + 1] += share * middle;
-        line.slopes[cell] -= share / spacing;
-        line.slopes[cell + 1] += share / spacing;
+
+    fn update_domains(
+        &self,
+        rule: DomainUpdate,
+        step: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_rectangles(rule, step, points)
+    }
+
+    fn cell_moments(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &Influences<D>,
+        rows: RowNodes<'_>,
+    ) -> Result<Vec<Moments>> {
+        centre::moments_of_domains(grid, points, !influences.hoop.is_empty(), rows)
+    }
+
+    fn fill_cell_rows(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        rows: RowNodes<'_>,
+        sums: &[Moments],
+    ) -> Result<()> {
+        centre::fill_from_domains(grid, points, influences, rows, sums)
+    }
+
+    fn make_rings(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+    ) -> Result<()> {
+        radial::rings_of_domains(grid, points, influences)
     }
 }

@@ -7,6 +7,7 @@
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
 //! | (all) | `contract.rs` | `trait Basis`: what each of them owes |
+//! | `gimp` | `hats.rs` | cells that a domain overlaps, and means of hats over it |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
 //! | `locking` | `centre.rs` | gradients of cells, for F-bar |
@@ -19,6 +20,7 @@ pub mod contract;
 pub(crate) mod domain;
 pub(crate) mod gimp;
 pub(crate) mod groups;
+pub(crate) mod hats;
 pub(crate) mod mpm;
 mod product;
 pub(crate) mod radial;
@@ -41,6 +43,16 @@ use crate::deck::model::{Basis, GimpEdge};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
+
+/// The functions of a deck. A new basis is a line here.
+pub fn of_deck<const D: usize>(basis: Basis, edge: GimpEdge) -> Box<dyn contract::Basis<D>> {
+    match basis {
+        Basis::Mpm => Box::new(mpm::Mpm),
+        Basis::Gimp => Box::new(gimp::Gimp { edge }),
+        Basis::Cpdi1 => Box::new(cpdi1::Cpdi1),
+        Basis::Cpdi2 => Box::new(cpdi2::Cpdi2),
+    }
+}
 
 /// Nodes, weights S and gradients dS/dX~ of all points of a rank, in compressed rows.
 /// Nodes ascend within a row and may belong to other ranks.
@@ -174,7 +186,7 @@ pub fn map_points_with<const D: usize>(
     edge: GimpEdge,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
-    contract::of_deck(basis, edge).map_points(grid, points)
+    of_deck(basis, edge).map_points(grid, points)
 }
 
 /// Appends the cells populated by point `p`: strictly overlapped by its domain, or holding it.
@@ -189,7 +201,7 @@ pub fn populated_cells<const D: usize>(
     hint: Option<usize>,
     out: &mut Vec<usize>,
 ) -> Result<()> {
-    contract::of_deck(basis, GimpEdge::Continued).populated_cells(grid, points, p, hint, out)
+    of_deck(basis, GimpEdge::Continued).populated_cells(grid, points, p, hint, out)
 }
 
 /// The lattice that `gimp` needs under its axis-aligned domains.

@@ -4,19 +4,61 @@
 //! of its cell, also those with weight zero. In explicit analyses, where the mass decides, the
 //! assembly may choose another cell that holds the point ([`Influences::replace_row`]).
 
-use super::{Influences, Row, outside, row};
+use super::centre::{self, Moments, RowNodes};
+use super::contract::Basis;
+use super::{Influences, Row, outside, radial, row};
 use crate::error::Result;
 use crate::grid::bins::REACH;
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
-pub(crate) fn map_points<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-) -> Result<Influences<D>> {
-    match grid {
-        Grid::Lattice(lattice) => map_points_on_lattice(grid, lattice, points),
-        Grid::Mesh(_) => map_points_on_mesh(grid, points),
+/// Points without extent.
+pub struct Mpm;
+
+impl<const D: usize> Basis<D> for Mpm {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        match grid {
+            Grid::Lattice(lattice) => map_points_on_lattice(grid, lattice, points),
+            Grid::Mesh(_) => map_points_on_mesh(grid, points),
+        }
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        let x = &points.position[p];
+        out.push(grid.locate_near(x, hint).ok_or_else(|| outside(grid, points, p))?);
+        Ok(())
+    }
+
+    fn of_one_cell(&self) -> bool {
+        true
+    }
+
+    fn fill_cell_rows(
+        &self,
+        _: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        _: RowNodes<'_>,
+        _: &[Moments],
+    ) -> Result<()> {
+        centre::fill_from_points(points, influences);
+        Ok(())
+    }
+
+    fn make_rings(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+    ) -> Result<()> {
+        radial::rings_of_points(grid, points, influences)
     }
 }
 
@@ -86,16 +128,4 @@ pub(super) fn fill_in<const D: usize>(
     for (a, &entry) in row.entries().iter().enumerate() {
         put(a, entry);
     }
-}
-
-pub(crate) fn populated_cells<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    hint: Option<usize>,
-    out: &mut Vec<usize>,
-) -> Result<()> {
-    let x = &points.position[p];
-    out.push(grid.locate_near(x, hint).ok_or_else(|| outside(grid, points, p))?);
-    Ok(())
 }

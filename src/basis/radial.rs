@@ -17,14 +17,24 @@
 //! For `mpm` the domain is a point, and S = S° = N(x_p). A domain that reaches beyond the axis, by what
 //! its update is off, ends at the axis.
 
-use super::centre::Piece;
 use super::contract::Basis;
-use super::gimp::{self, spans};
+use super::hats::{self, spans};
 use super::product::{Line, for_each_index};
 use super::{Influences, lattice_of, outside};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
+
+/// A domain's part in a cell, along one axis.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Piece {
+    /// Of the domain, of rings by volume
+    pub share: f64,
+    /// Mean place in the cell, so weighted
+    pub place: f64,
+    /// Of rings along the radius: share of the area over the domain's radius, 1/m; and the plain mean place.
+    pub plain: [f64; 2],
+}
 
 /// Makes the rows those of rings: fills `hoop`, and weighs those of `gimp` by the radius. Error: a
 /// point that is not off the axis, by id and place.
@@ -69,7 +79,7 @@ pub(super) fn rings_of_domains<const D: usize>(
         for axis in 1..D {
             let (centre, spacing) = (lattice.scaled(axis, x[axis]), lattice.spacing[axis]);
             let reach = half[axis] / spacing;
-            gimp::fill(&mut lines[axis], spans[axis], centre, reach, spacing, None);
+            hats::fill(&mut lines[axis], spans[axis], centre, reach, spacing, None);
         }
         let cells = spans[0].last - spans[0].first + 1;
         let ends = [(x[0] - half[0]).max(0.0), x[0] + half[0]];

@@ -11,8 +11,8 @@ use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use super::terms::surface;
 use crate::basis::centre::{Moments, RowNodes};
-use crate::basis::contract::{self, Basis};
-use crate::basis::{Groups, Influences, radial};
+use crate::basis::contract::Basis;
+use crate::basis::{self, Groups, Influences, radial};
 use crate::contact::fields::Fields;
 use crate::deck::model::{Locking, PointVolume, Symmetry};
 use crate::error::{Error, Result};
@@ -104,7 +104,7 @@ impl<const D: usize> Discretisation<D> {
         coupling: Coupling,
     ) -> Result<Self> {
         let method = &model.deck.method;
-        let basis = contract::of_deck(method.basis, method.gimp_edge);
+        let basis = basis::of_deck(method.basis, method.gimp_edge);
         Self::with_basis(world, model, points, coupling, &*basis)
     }
 
@@ -296,7 +296,7 @@ pub fn active<const D: usize>(
 ) -> Result<(Populated, Numbering)> {
     let (grid, partition) = (&model.grid, &model.partition);
     let method = &model.deck.method;
-    let basis = contract::of_deck(method.basis, method.gimp_edge);
+    let basis = basis::of_deck(method.basis, method.gimp_edge);
     let kinds = (&*basis, model.deck.bodies.len());
     let populated = Populated::find(world, grid, partition, kinds, points, None)?;
     let mut reached = Vec::new();

@@ -5,7 +5,8 @@ use std::cell::Cell;
 
 use nalgebra::Matrix3;
 
-use crate::basis::contract::{self, DomainStep};
+use crate::basis;
+use crate::basis::domain::DomainStep;
 use crate::deck::figure;
 use crate::deck::model::{Basis, Boundary, GimpEdge, Place, Symmetry};
 use crate::deck::schema::{AXES, SIDES};
@@ -279,7 +280,7 @@ pub fn require_sound_domains<const D: usize>(
     points: &Points<D>,
     increments: &mut Increments<D>,
 ) -> std::result::Result<(), Refusal> {
-    let functions = contract::of_deck::<D>(basis, GimpEdge::Continued);
+    let functions = basis::of_deck::<D>(basis, GimpEdge::Continued);
     if !functions.domains_deform() {
         return Ok(());
     }
@@ -468,7 +469,7 @@ pub fn follow<const D: usize>(
         nodal: &|p, node| nodal_displacement(numbering, displacement, (body(p), node)),
         rings: model.deck.analysis.symmetry == Symmetry::Axisymmetric,
     };
-    contract::of_deck(method.basis, method.gimp_edge).update_domains(
+    basis::of_deck(method.basis, method.gimp_edge).update_domains(
         method.domain_update,
         &step,
         points,

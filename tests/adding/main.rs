@@ -15,7 +15,8 @@ use mpi::environment::Universe;
 use mpi::traits::*;
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use mpm_par::analysis::solver::{self, Linear, Shape};
-use mpm_par::basis::contract::{self, Basis};
+use mpm_par::basis::contract::Basis;
+use mpm_par::basis::of_deck;
 use mpm_par::deck;
 use mpm_par::deck::When;
 use mpm_par::deck::model::{self, AnalysisType, Frame, GimpEdge, InvertedIterates};
@@ -215,7 +216,7 @@ fn rest_on_springs(world: &World, basis: &dyn Basis<2>) {
 fn rest_on_linear_functions(universe: &Universe) {
     let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
     let world = World::new(universe.world().duplicate());
-    rest_on_springs(&world, &*contract::of_deck(model::Basis::Mpm, GimpEdge::Continued));
+    rest_on_springs(&world, &*of_deck(model::Basis::Mpm, GimpEdge::Continued));
 }
 
 #[test]

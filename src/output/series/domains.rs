@@ -9,7 +9,7 @@
 
 use super::point_field::append_vector;
 use super::xdmf::Topology;
-use crate::basis::contract;
+use crate::basis;
 use crate::deck::model::{Basis, GimpEdge};
 use crate::points::Points;
 
@@ -25,7 +25,7 @@ pub fn topology(basis: Basis, dimension: usize) -> Option<Topology> {
 /// The 2^D corners of point `p`'s domain, counter-clockwise, hex8 order in 3D; the point itself
 /// repeated for `mpm`.
 pub fn corners<const D: usize>(points: &Points<D>, basis: Basis, p: usize) -> [[f64; D]; 8] {
-    let basis = contract::of_deck(basis, GimpEdge::Continued);
+    let basis = basis::of_deck(basis, GimpEdge::Continued);
     basis.corners(points, p).unwrap_or([points.position[p]; 8])
 }
 
