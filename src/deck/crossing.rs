@@ -62,10 +62,12 @@ impl Shape {
                     value != 0.0 && !value.is_nan()
                 };
                 let at = |k: usize| k as f64 / SAMPLES as f64;
+                let mut next = holds(at(0));
                 for k in 0..SAMPLES {
                     let (mut low, mut high) = (at(k), at(k + 1));
-                    let first = holds(low);
-                    if first != holds(high) {
+                    let first = next;
+                    next = holds(high);
+                    if first != next {
                         for _ in 0..40 {
                             let middle = 0.5 * (low + high);
                             if holds(middle) == first { low = middle } else { high = middle }

@@ -90,12 +90,16 @@ pub(crate) fn states<'a, const D: usize>(
     out: &mut [StressState],
 ) {
     const NONE: Spectrum = Spectrum { values: [0.0; 3], axes: [[0.0; 3]; 3] };
+    let Some(last) = increments.len().checked_sub(1) else { return };
+    // Gathered once; what lies beyond the last point is not read.
+    let starts: [StepStart; BATCH] = std::array::from_fn(|k| start(k.min(last)));
+    let starts = &starts[..increments.len()];
     let mut trials = [NONE; BATCH];
     let trials = &mut trials[..increments.len()];
     let (mut stresses, mut values) = ([[0.0; 3]; BATCH], [[0.0; 3]; BATCH]);
     for (k, (trial_of, block)) in trials.iter_mut().zip(increments).enumerate() {
         let hoop = hoops.get(k).copied().unwrap_or(0.0);
-        *trial_of = trial(start(k).elastic_excess, Increment { block, hoop });
+        *trial_of = trial(starts[k].elastic_excess, Increment { block, hoop });
     }
     for (strain, trial) in values.iter_mut().zip(&*trials) {
         *strain = trial.values.map(ln_1p);
@@ -111,20 +115,14 @@ pub(crate) fn states<'a, const D: usize>(
         state.state = response.state;
     };
     let strain = |k: usize| strains[k].map(|e| 0.5 * e);
-    let alike = |material: LocalMaterial| {
-        (0..increments.len()).all(|k| start(k).material.shares_parameters(&material))
-    };
-    match increments.first().map(|_| start(0).material) {
+    let first = starts[0].material;
+    if starts.iter().all(|start| start.material.shares_parameters(&first)) {
         // The model is chosen once for all of them.
-        Some(first) if alike(first) => {
-            first.material.respond_each(increments.len(), strain, |k| start(k).state, take);
-        }
-        _ => {
-            for k in 0..increments.len() {
-                let StepStart { material, state: before, .. } = start(k);
-                let response = material.respond(strain(k), before);
-                take(k, response, material.energy(response.elastic_strain));
-            }
+        first.material.respond_each(starts.len(), strain, |k| starts[k].state, take);
+    } else {
+        for (k, start) in starts.iter().enumerate() {
+            let response = start.material.respond(strain(k), start.state);
+            take(k, response, start.material.energy(response.elastic_strain));
         }
     }
     for (k, (state, trial)) in out.iter_mut().zip(&*trials).enumerate() {

@@ -61,8 +61,9 @@ impl<const D: usize> Moments<D> {
 /// Share of the box's volume to which an integral over an axis is found; the innermost integral is
 /// exact.
 const TOLERANCE: [[f64; 2]; 2] = [[1e-8, 0.0], [2e-4, 5e-5]];
-/// Share for a whole shape in the plane, whose volume a plan prints to four digits.
-const OF_WHOLE: f64 = 1e-6;
+/// For a whole shape in the plane, whose volume a plan prints to four digits. What is left of a disc is
+/// 2e-8, as each halving gains two digits.
+const OF_WHOLE: f64 = 1e-5;
 /// Halvings of a panel at most.
 const HALVINGS: [usize; 2] = [26, 5];
 /// Lines along each of two axes that a volume in 3D is summed over.
