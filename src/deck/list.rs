@@ -81,8 +81,11 @@ fn cut(text: &str) -> String {
     format!("{} ...", short[..end].trim_end_matches([',', ';', ':']))
 }
 
+/// A sentence ends at a full stop before a capital: "eq. 43" goes on.
 fn first_sentence(text: &str) -> &str {
-    text.split_once(". ").map_or(text, |(first, _)| first).trim_end_matches('.')
+    let mut stops = text.match_indices(". ");
+    let end = stops.find(|(at, _)| text[at + 2..].starts_with(char::is_uppercase));
+    end.map_or(text, |(at, _)| &text[..at]).trim_end_matches('.')
 }
 
 #[cfg(test)]
@@ -98,6 +101,7 @@ mod tests {
         for name in CATALOGUE.iter().map(|entry| entry.name).chain(Basis::NAMES.iter().copied()) {
             assert!(text.lines().any(|line| line.trim_start().starts_with(name)), "{name}");
         }
+        assert!(text.contains("(Lagrangian eq. 43)") && !text.contains("eq\n"), "{text}");
         let widest = text.lines().map(str::len).max().unwrap_or(0);
         assert!(widest < 160, "{widest} columns");
     }

@@ -1,9 +1,12 @@
+from spack_repo.builtin.build_systems.cargo import CargoPackage
+
 from spack.package import *
 
 
 class MpmPar(CargoPackage):
     """Distributed implicit and explicit material point method on PETSc."""
 
+    # The sources are a clone: in its folder, `spack dev-build mpm-par@main`.
     license("MIT OR Apache-2.0")
 
     version("main", branch="main")
