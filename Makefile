@@ -11,7 +11,7 @@ help:
 	@echo "make run       install what is missing, build, run $(DECK) on $(RANKS) ranks"
 	@echo "make install   build, and copy mpm-par to $(PREFIX)/bin (PREFIX=...)"
 	@echo "make test      all tests"
-	@echo "make lint      format and clippy, warnings are errors"
+	@echo "make lint      format, clippy and documentation, warnings are errors"
 	@echo "make bench     time the parts of a step beside the machine's limits"
 	@echo "make iterations  linear iterations on a curved body: table and figure (long)"
 	@echo "make scaling   strong and weak scaling: timed on this machine's cores, counted to 64 ranks"
@@ -71,7 +71,7 @@ portability: setup
 
 # The book needs mdbook (cargo install mdbook); without it only the code's documentation is made.
 docs: setup
-	cargo doc --no-deps
+	cargo doc --no-deps --document-private-items
 	@if command -v mdbook >/dev/null; then mdbook build docs; else echo "no mdbook: target/book is not made"; fi
 
 # The picture of every template, by the program itself.
@@ -88,6 +88,7 @@ install-extras: install
 lint:
 	cargo fmt --check
 	cargo clippy --all-targets -- -D warnings
+	RUSTDOCFLAGS="-D warnings" cargo doc --no-deps --document-private-items
 
 clean:
 	cargo clean

@@ -66,7 +66,7 @@ struct CommandLine {
     /// Change a key of the deck by its dotted path; the value is TOML
     #[arg(long, value_name = "KEY=VALUE", allow_hyphen_values = true)]
     set: Vec<String>,
-    /// Results directory (default: out/<deck file stem>)
+    /// Results directory (default: out/ and the name of the deck)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Validate, build, print the plan; run nothing

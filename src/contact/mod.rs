@@ -4,7 +4,7 @@
 //!
 //! | deck key | type | file |
 //! |---|---|---|
-//! | what a surface says of a place | [`Surface`], [`Near`] | `surface.rs` |
+//! | what a surface says of a place | [`Surface`](surface::Surface), [`Near`] | `surface.rs` |
 //! | `half_space` | [`HalfSpace`](half_space::HalfSpace) | `half_space.rs` |
 //! | `disc`, `ball` | [`Ball`](ball::Ball) | `ball.rs` |
 //! | `box` | [`Cuboid`](cuboid::Cuboid) | `cuboid.rs` |
@@ -26,7 +26,7 @@
 //! | what points are told for fields `contact_*` | [`Told`](told::Told) | `told.rs` |
 //! | the rigid bodies and contacts of a deck | [`Contacts`] | `contacts.rs` |
 //!
-//! A new surface is one file that implements [`Surface`] and one line of `contacts.rs`. The forces
+//! A new surface is one file that implements [`Surface`](surface::Surface) and one line of `contacts.rs`. The forces
 //! and their tangent are a term of the equations: `system/terms/contact.rs`.
 
 pub(crate) mod ball;

@@ -1,4 +1,4 @@
-//! [G] of Ghost eq. 23: the jump of the normal derivative of the basis across an interior face.
+//! `[G]` of Ghost eq. 23: the jump of the normal derivative of the basis across an interior face.
 //!
 //! Only the scalar jump dN/dn is kept, because J_G is the same for every component. The normal
 //! is constant in sign over the face and points from the lower to the upper cell; reversing it

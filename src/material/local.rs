@@ -38,7 +38,7 @@ impl<'a> LocalMaterial<'a> {
             && other.parameters.is_empty()
     }
 
-    /// See [`Model::respond`].
+    /// See [`Model::respond`](super::model::Model::respond).
     #[inline(always)]
     pub fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
         if self.parameters.is_empty() {
@@ -53,7 +53,7 @@ impl<'a> LocalMaterial<'a> {
         self.model().respond(trial, state)
     }
 
-    /// See [`Model::energy`].
+    /// See [`Model::energy`](super::model::Model::energy).
     #[inline(always)]
     pub fn energy(&self, elastic_strain: [f64; 3]) -> f64 {
         if self.parameters.is_empty() {

@@ -59,7 +59,7 @@ macro_rules! point_field_table {
         /// A field of the material points, named as in `output.fields`.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum PointField {
-            $( #[doc = concat!("`", $name, "` of [`FIELDS`]")] $variant, )*
+            $( #[doc = concat!("`", $name, "` of [`FIELDS`](crate::deck::fields::FIELDS)")] $variant, )*
             /// A state variable of a material; zero at points whose material has none of the name.
             State(StateVariable),
         }

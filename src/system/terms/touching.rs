@@ -17,7 +17,7 @@ pub struct Exerted {
     pub force: [f64; 3],
     /// Sum of the sizes of the forces on the corners, N.
     pub sum_abs: f64,
-    /// About [`Rigid::torque_centre`](crate::contact::Rigid::torque_centre), N m; in 2D along z.
+    /// About [`Rigid::torque_centre`](crate::contact::contacts::Rigid::torque_centre), N m; in 2D along z.
     pub torque: [f64; 3],
 }
 
