@@ -280,7 +280,7 @@ fn what_two_bodies_cannot_do_is_told_with_the_cure() {
     for (set, expected) in [
         (
             &["analysis={ type = \"quasi-static\", steps = 1 }", "method.mass="][..],
-            &["in explicit runs only", "[[rigid]]"][..],
+            &["not known between two bodies in implicit runs", "[[rigid]]"][..],
         ),
         (&["method.mass=\"consistent\""], &["takes a lumped mass", "method.mass = \"lumped\""]),
         (&["contact.0.penalty=20"], &["has no effect between two bodies"]),

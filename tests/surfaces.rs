@@ -681,6 +681,29 @@ fn files_that_bound_no_body_are_refused() {
     assert!(outcome.code == 2 && outcome.said().contains("cannot be read"), "{}", outcome.said());
 }
 
+/// A run does not go on with another file of triangles under the name of the first one.
+#[test]
+fn a_restart_knows_its_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (deck, out) = (folder.path().join("deck.toml"), folder.path().join("out"));
+    let file = folder.path().join("ball.stl");
+    let text = SOLID
+        .replace("steps = 1", "steps = 2")
+        .replace("every = 1\n", "every = 1\ncheckpoint = { every = 1 }\n");
+    std::fs::write(&deck, text).expect("a deck");
+    std::fs::write(&file, stl(&ball(1.07, 1))).expect("a file");
+    program::run_well(1, &deck, &out, &[]);
+    let first = out.join("checkpoint-000001.h5").display().to_string();
+    let other = folder.path().join("other");
+    program::run_well(1, &deck, &other, &["--restart", &first]);
+    std::fs::write(&file, stl(&ball(1.0701, 1))).expect("a file");
+    let refused = program::run(2, &deck, &folder.path().join("third"), &["--restart", &first]);
+    let said = program::text(&refused);
+    assert_eq!(refused.status.code(), Some(3), "{said}");
+    assert!(said.contains("belongs to another problem"), "{said}");
+    assert!(said.contains("checksum of ball.stl"), "{said}");
+}
+
 /// A rigid box of twelve facets presses a block as the box does.
 #[test]
 fn a_rigid_body_of_triangles_presses_as_its_form_does() {

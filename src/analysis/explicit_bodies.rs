@@ -8,11 +8,11 @@ use crate::contact::told::{self, Told};
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
-use crate::record::contact::Met;
 use crate::system::model::Model;
 use crate::system::shared_nodes::SharedNode;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::contact::TOUCH;
+use crate::system::terms::touching::Met;
 use crate::tensor::dense::dot;
 
 /// Passes over the pairs of bodies at a node with more than one.

@@ -6,12 +6,13 @@ use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::points::Points;
-use crate::record::contact::{ContactTotals, Met};
+use crate::record::contact::ContactTotals;
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::contact::ContactTerm;
 use crate::system::terms::touching::Finished;
+use crate::system::terms::touching::Met;
 
 use super::free_bodies::{FreeBodies, gravity};
 

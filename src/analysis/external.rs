@@ -35,7 +35,7 @@ impl<const D: usize> Loads<D> {
     ) -> Result<Self> {
         let points_start = model.point_forces(world, points, span.start())?;
         let points_end = model.point_forces(world, points, span.end())?;
-        let mut external_start = owned_forces(world, mesh, &points_start)?;
+        let mut external_start = owned_forces(world, mesh, (points, &points_start))?;
         let mut nodes_start = Vec::new();
         if let Some(following) = Following::new(model, mesh, points, span.start()) {
             nodes_start = following.at_start(&mesh.pattern, mesh.numbering.len());
@@ -46,7 +46,7 @@ impl<const D: usize> Loads<D> {
         Ok(Loads {
             external_start,
             nodes_start,
-            external_end: owned_forces(world, mesh, &points_end)?,
+            external_end: owned_forces(world, mesh, (points, &points_end))?,
             points_start,
         })
     }
@@ -94,7 +94,7 @@ pub(super) fn add(a: &mut [f64], share: f64, b: &[f64]) {
 fn owned_forces<const D: usize>(
     world: &World,
     mesh: &Discretisation<D>,
-    forces: &[[f64; D]],
+    forces: (&Points<D>, &[[f64; D]]),
 ) -> Result<Vec<f64>> {
     let numbering = &mesh.numbering;
     let mut nodal = mapping::forces_at_nodes(numbering, &mesh.influences, forces);

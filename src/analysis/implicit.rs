@@ -18,6 +18,7 @@ use crate::system::numbering::Numbering;
 use crate::system::step_system::{Coupling, Discretisation};
 use crate::system::terms::Term;
 use crate::system::terms::contact::ContactTerm;
+use crate::system::terms::facing::FacingTerm;
 use crate::system::terms::surface::Borne;
 use crate::system::terms::touching;
 use crate::transfer::refusal::{Cause, Halt, Refusal};
@@ -117,6 +118,11 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             loads.nodes_start.resize(mesh.numbering.len() * D, 0.0);
             contact.add_force_at_start(&mut loads.nodes_start);
         }
+        let facing = FacingTerm::new(model, &mesh);
+        if let (Some(facing), Some(_)) = (&facing, &self.dynamics) {
+            loads.nodes_start.resize(mesh.numbering.len() * D, 0.0);
+            facing.add_force_at_start(&mut loads.nodes_start);
+        }
         let inertial = match &mut self.dynamics {
             Some(dynamics) => {
                 let by = (span, &mut dynamics.solver);
@@ -147,6 +153,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             if let Some(contact) = &contact {
                 terms.push(Box::new(contact));
             }
+            if let Some(facing) = &facing {
+                terms.push(Box::new(facing));
+            }
             // Inertia scales what stands before it.
             for term in inertia {
                 terms.push(term);
@@ -176,6 +185,11 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         {
             return Err(Refusal { cause: Cause::Penetration, what }.into());
         }
+        if let Some(facing) = &facing
+            && let Some(what) = world.first_message(facing.too_deep(points, &displacement))
+        {
+            return Err(Refusal { cause: Cause::Penetration, what }.into());
+        }
         let carry = || Ok(newton::carried(world, model, &mesh, points, &displacement, span));
         let Carried { made, moved_grid } = clock.time(Phase::Update, carry)??;
 
@@ -187,6 +201,8 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             None => (out_of_balance, [solved.internal_start, solved.internal]),
         };
         let touching = contact.map(|contact| contact.finish(&displacement, shares));
+        let (met, told) =
+            facing.map_or_else(Default::default, |facing| facing.finish(&displacement, shares));
         let external = [&loads.external_start[..], &loads.external_end];
         let mut work = work_of_step::<D>(
             conditions,
@@ -206,7 +222,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let updated = update::apply(model, numbering, &displacement, &made, points, kept);
             world.fail_together(updated)?;
             let (done, kept) = (touching.as_ref(), before.as_deref_mut());
-            touching::keep(&model.contacts, done, Vec::new(), points, kept);
+            touching::keep(&model.contacts, done, told, points, kept);
             if let (Some(rates), Some(before)) = (of_points, before) {
                 before.velocity.replace(&mut points.velocity, rates.velocity);
                 before.acceleration.replace(&mut points.acceleration, rates.acceleration);
@@ -240,6 +256,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
         if let Some(touching) = &touching {
             self.contact.book(world, touching, &mut row);
         }
+        self.contact.book_bodies(world, &met, &mut row);
         match (&mut self.dynamics, &inertial, &rates) {
             (Some(dynamics), Some(inertial), Some(rates)) => {
                 let sums = inertial.sums(&mesh, conditions, (rates, &displacement), energies, work);

@@ -14,7 +14,7 @@ use super::pose::Pose;
 use super::surface::{Surface, length};
 use super::told;
 use super::triangles::Triangles;
-use crate::deck::model::{self, Basis, Partner, RigidShape, Symmetry};
+use crate::deck::model::{self, AnalysisType, Basis, Partner, RigidShape, Symmetry};
 use crate::deck::{self, Deck, Presence};
 use crate::error::{Error, Result};
 
@@ -63,6 +63,8 @@ pub struct BodyPair {
     pub index: usize,
     /// Indices into the deck's bodies.
     pub bodies: [usize; 2],
+    /// ε of implicit steps, Pa/m.
+    pub penalty: f64,
     pub friction: Friction,
     pub presence: Presence,
 }
@@ -104,12 +106,20 @@ impl<const D: usize> Contacts<D> {
                 }),
                 Partner::Body(other) => {
                     let bodies = [contact.body, other];
-                    body_pairs.push(BodyPair { index, bodies, friction, presence });
+                    // The softer one says how deep a pressure goes.
+                    let softer = stiffness[contact.body].min(stiffness[other]);
+                    let penalty = contact.penalty * softer / cell;
+                    body_pairs.push(BodyPair { index, bodies, penalty, friction, presence });
                 }
             }
         }
-        let touching = body_pairs.iter().flat_map(|pair| pair.bodies);
-        let fields = Fields::of_bodies(deck.bodies.len(), touching, nodes);
+        let fields = match deck.analysis.kind {
+            AnalysisType::Explicit => {
+                let touching = body_pairs.iter().flat_map(|pair| pair.bodies);
+                Fields::of_bodies(deck.bodies.len(), touching, nodes)
+            }
+            _ => joined_fields(deck, &body_pairs, nodes)?,
+        };
         let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
         Ok(Contacts { rigids, pairs, body_pairs, fields, rings, tells: told::is_wanted(deck) })
     }
@@ -163,6 +173,35 @@ impl<const D: usize> Contacts<D> {
         };
         self.rigids.iter().map(pose).collect()
     }
+}
+
+/// Fields of implicit runs: bodies that no contact names together move in one field. Error: two bodies
+/// that touch each other would so share one.
+fn joined_fields(deck: &Deck, pairs: &[BodyPair], nodes: usize) -> Result<Fields> {
+    let touch = |a: usize, b: usize| {
+        pairs.iter().any(|pair| pair.bodies == [a, b] || pair.bodies == [b, a])
+    };
+    let mut fields: Vec<usize> = (0..deck.bodies.len()).collect();
+    for a in 0..fields.len() {
+        for b in (0..a).filter(|&b| !touch(a, b)) {
+            let (joined, into) = (fields[a].max(fields[b]), fields[a].min(fields[b]));
+            fields.iter_mut().filter(|field| **field == joined).for_each(|field| *field = into);
+        }
+    }
+    let shared = pairs.iter().find(|pair| fields[pair.bodies[0]] == fields[pair.bodies[1]]);
+    let Some(pair) = shared else { return Ok(Fields::of_classes(&fields, nodes)) };
+    let [one, two] = pair.bodies;
+    let between =
+        (0..fields.len()).find(|&c| c != one && c != two && !(touch(one, c) && touch(two, c)));
+    let name = |body: usize| deck.bodies[body].name.as_str();
+    let why = format!(
+        "\"{}\" and \"{}\" touch each other, but bodies that no contact names together move as one in \
+         implicit runs, and so these two would by way of \"{}\": name it in contacts with one of them or both",
+        name(one),
+        name(two),
+        between.map_or("others", name),
+    );
+    Err(Error::Input(deck.places.say(&format!("contact.{}.between", pair.index), &why)))
 }
 
 fn friction(contact: &model::Contact) -> Friction {

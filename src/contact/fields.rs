@@ -33,6 +33,18 @@ impl Fields {
         Fields { of_body: marks.into_iter().map(field).collect(), nodes }
     }
 
+    /// A field for each class of bodies that move together; `classes`: any numbers, one per body.
+    pub fn of_classes(classes: &[usize], nodes: usize) -> Self {
+        let mut known = classes.to_vec();
+        known.sort_unstable();
+        known.dedup();
+        if known.len() < 2 {
+            return Fields::default();
+        }
+        let field = |class: &usize| known.partition_point(|other| other < class);
+        Fields { of_body: classes.iter().map(field).collect(), nodes }
+    }
+
     /// How many there are.
     pub fn count(&self) -> usize {
         self.of_body.iter().max().map_or(1, |last| last + 1)

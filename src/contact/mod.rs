@@ -1,6 +1,6 @@
 //! Contact of bodies with rigid surfaces, by a penalty (formulations.md B.5; Bird et al. 2024,
 //! arXiv 2412.01565), and with each other, by impulses at nodes (Bardenhagen et al. 2001; Nairn et al.
-//! 2020).
+//! 2020) in explicit runs and by a penalty in implicit ones ([`crate::system::facing`]).
 //!
 //! | deck key | type | file |
 //! |---|---|---|

@@ -118,6 +118,28 @@ impl Shape {
         Shape { form, placement: Placement::default() }
     }
 
+    /// Whether a condition on the place (`where`) is among its forms: no surface is known of that.
+    pub fn has_condition(&self) -> bool {
+        match &self.form {
+            Form::Where(_) => true,
+            Form::Union(parts) | Form::Intersection(parts) | Form::Difference(parts) => {
+                parts.iter().any(Shape::has_condition)
+            }
+            _ => false,
+        }
+    }
+
+    /// Appends the solids of triangles that it is made of.
+    pub fn solids<'a>(&'a self, found: &mut Vec<&'a Solid>) {
+        match &self.form {
+            Form::Solid(solid) => found.push(solid),
+            Form::Union(parts) | Form::Intersection(parts) | Form::Difference(parts) => {
+                parts.iter().for_each(|part| part.solids(found));
+            }
+            _ => {}
+        }
+    }
+
     /// Renames the files that its forms came from.
     pub fn rename_files(&mut self, rename: &impl Fn(&mut PathBuf)) {
         match &mut self.form {

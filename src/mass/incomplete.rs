@@ -210,7 +210,7 @@ impl Incomplete {
                     let column = self.columns[entry] as usize;
                     // Inner nodes meet no node of the other rank.
                     if position[column] as usize >= self.inner {
-                        let node = numbering.nodes[column] as u64;
+                        let node = numbering.key(column) as u64;
                         entries.push(FactorEntry { node, value: self.values[entry] });
                     }
                 }
@@ -325,6 +325,7 @@ mod tests {
         let diagonal: Vec<f64> = (0..rows).map(|row| entry(row, row)).collect();
         let numbering = Numbering {
             fields: Default::default(),
+            keys: Vec::new(),
             owned: rows,
             offset: 0,
             total: rows,

@@ -7,7 +7,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::deck::model::{AnalysisType, Checkpoint as Plan, Grid as GridSource, MeshSource};
+use crate::deck::model::{
+    AnalysisType, BodySource, Checkpoint as Plan, Grid as GridSource, MeshSource, RigidShape,
+};
 use crate::deck::physics::Physics;
 use crate::deck::{self, Deck};
 use crate::error::{Error, Result};
@@ -116,27 +118,58 @@ impl Checkpointer {
     }
 }
 
-/// What identifies the problem in a checkpoint: the deck's physics and, for a mesh from a file,
-/// a checksum of that file. Collective.
+/// What identifies the problem in a checkpoint: the deck's physics and a checksum of each file that it
+/// takes a mesh, points or triangles from. Collective.
 pub fn physics_of(world: &World, deck: &Deck) -> Result<Physics> {
     let mut physics = Physics::of(deck);
     if let GridSource::Mesh(mesh) = &deck.grid
         && let MeshSource::File(path) = &mesh.source
     {
-        let mut sum = 0_u64;
-        on_root(world.comm(), || {
-            let bytes = input_file::read(path, input_file::DATA).map_err(|reason| {
-                Error::Input(format!("cannot read the mesh {}: {reason}", path.display()))
-            })?;
-            sum = checksum_of_bytes(&bytes);
-            Ok(())
-        })?;
-        let mut bytes = sum.to_le_bytes().to_vec();
-        world.broadcast_bytes(0, &mut bytes);
-        let hex: Vec<String> = bytes.iter().rev().map(|byte| format!("{byte:02x}")).collect();
-        physics.push_line(&format!("checksum of the mesh file = {}", hex.concat()));
+        let sum = checksum_of_file(world, path, "the mesh")?;
+        physics.push_line(&format!("checksum of the mesh file = {sum:016x}"));
+    }
+    let mut solids = Vec::new();
+    for body in &deck.bodies {
+        match &body.source {
+            BodySource::File(file) => {
+                let sum = checksum_of_file(world, &file.path, "the points")?;
+                physics.push_line(&checksum_line(&file.path, sum));
+            }
+            BodySource::Shape { shape, .. } => shape.solids(&mut solids),
+            BodySource::MeshCells { .. } => {}
+        }
+    }
+    solids.extend(deck.rigids.iter().filter_map(|rigid| match &rigid.shape {
+        RigidShape::Solid(solid) => Some(&**solid),
+        _ => None,
+    }));
+    for solid in solids {
+        // Every rank has read them, so that no file is opened again.
+        let numbers = solid.triangles.as_flattened().as_flattened();
+        let bytes: Vec<u8> = numbers.iter().flat_map(|x| x.to_bits().to_le_bytes()).collect();
+        physics.push_line(&checksum_line(&solid.path, checksum_of_bytes(&bytes)));
     }
     Ok(physics)
+}
+
+fn checksum_line(path: &Path, sum: u64) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str()).display();
+    format!("checksum of {name} = {sum:016x}")
+}
+
+/// Collective. Error: it cannot be read; `what` names it.
+fn checksum_of_file(world: &World, path: &Path, what: &str) -> Result<u64> {
+    let mut sum = 0_u64;
+    on_root(world.comm(), || {
+        let bytes = input_file::read(path, input_file::DATA).map_err(|reason| {
+            Error::Input(format!("cannot read {what} {}: {reason}", path.display()))
+        })?;
+        sum = checksum_of_bytes(&bytes);
+        Ok(())
+    })?;
+    let mut bytes = sum.to_le_bytes().to_vec();
+    world.broadcast_bytes(0, &mut bytes);
+    Ok(bytes.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
 }
 
 /// Finds and reads the checkpoint that `--restart` names. `last`: the newest good one in the

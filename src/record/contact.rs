@@ -9,7 +9,7 @@ use crate::output::series::rigid_file::RigidFrame;
 use crate::output::tables::history::{ContactState, HistoryRow, Reaction};
 use crate::parallel::World;
 use crate::system::model::Model;
-use crate::system::terms::touching::Finished;
+use crate::system::terms::touching::{Finished, Met};
 
 /// The surfaces of the rigid bodies that are there in a stage, in these poses; of half spaces what
 /// crosses the grid.
@@ -33,31 +33,6 @@ pub fn surfaces<const D: usize>(
         all.add(own);
     }
     RigidFrame { corners: all.corners, facets: all.facets, body }
-}
-
-/// What two bodies exchange in a step, this rank's share.
-#[derive(Debug, Clone, Default)]
-pub struct Met {
-    /// Index into the deck's contacts.
-    pub index: usize,
-    /// On the second body, N.
-    pub force: [f64; 3],
-    /// m2 (m in 2D)
-    pub area: f64,
-    /// Σ A times the slip of the step, m3 (m2 in 2D).
-    pub slid: f64,
-    /// Of the deepest overlap, m.
-    pub depth: f64,
-    /// Dissipated by friction in the step, J.
-    pub friction: f64,
-    /// Lost along the normals, where bodies meet, J.
-    pub impact: f64,
-}
-
-impl Met {
-    pub fn of(index: usize) -> Self {
-        Met { index, ..Met::default() }
-    }
 }
 
 /// Sums of a run so far.
@@ -137,13 +112,14 @@ impl ContactTotals {
     pub fn book_bodies(&mut self, world: &World, met: &[Met], row: &mut HistoryRow) {
         let of_one = |one: &Met| {
             let [x, y, z] = one.force;
-            [x, y, z, one.area, one.slid, one.friction, one.impact]
+            [x, y, z, one.area, one.slid, one.friction, one.impact, one.energy]
         };
         let sums = world.sum_slice(&met.iter().flat_map(of_one).collect::<Vec<f64>>());
         let depths = world.max_slice(&met.iter().map(|one| one.depth).collect::<Vec<f64>>());
-        for ((one, sums), gap_max) in met.iter().zip(sums.chunks_exact(7)).zip(depths) {
+        for ((one, sums), gap_max) in met.iter().zip(sums.chunks_exact(8)).zip(depths) {
             self.dissipation += sums[5];
             self.impact += sums[6];
+            row.energy_contact += sums[7];
             let force = [sums[0], sums[1], sums[2]];
             self.book_state(one.index, [sums[3], sums[4], gap_max], force, row);
         }

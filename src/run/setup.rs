@@ -192,6 +192,7 @@ fn model_of<const D: usize>(
     let supports = surfaces::supports(world, &deck, points, grid.cell_size())?;
     let contacts =
         Arc::new(Contacts::of_deck(&deck, &stiffness, (grid.cell_size(), grid.node_count()))?);
+    let facing = surfaces::facing(world, &deck, points, &contacts)?;
     let symmetric = symmetric
         && contacts.symmetric()
         && loads.iter().all(|load| load.symmetric())
@@ -207,6 +208,7 @@ fn model_of<const D: usize>(
         symmetric,
         loads,
         supports,
+        facing,
         contacts,
         manufactured,
         balance,

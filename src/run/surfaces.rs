@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use crate::contact::Contacts;
 use crate::deck::Deck;
-use crate::deck::model::{BodySource, BodySurface, Held, Symmetry};
+use crate::deck::model::{AnalysisType, BodySource, BodySurface, Held, Symmetry};
 use crate::deck::shape::Shape;
 use crate::error::{Error, Result};
 use crate::parallel::World;
@@ -40,6 +41,35 @@ pub fn of_body<const D: usize>(
     let what = format!("body \"{}\"", body.name);
     let carried = carriers::carried(world, points, wanted.body, &elements, spacing, &what);
     carried.map(Surface::new).map_err(|error| wrong(&error.to_string()))
+}
+
+/// Surfaces of the bodies that touch others in implicit runs, one per body; empty without any.
+/// Collective.
+pub fn facing<const D: usize>(
+    world: &World,
+    deck: &Deck,
+    points: &Points<D>,
+    contacts: &Contacts<D>,
+) -> Result<Vec<Option<Surface<D>>>> {
+    if contacts.body_pairs.is_empty() || deck.analysis.kind == AnalysisType::Explicit {
+        return Ok(Vec::new());
+    }
+    let of_body = |body: usize| {
+        let pair = contacts.body_pairs.iter().find(|pair| pair.bodies.contains(&body));
+        let wanted = BodySurface { body, side: None, within: None };
+        let Some(pair) = pair else { return Ok(None) };
+        let key = format!("contact.{}.between", pair.index);
+        if shape_of(deck, body).is_some_and(Shape::has_condition) {
+            let name = &deck.bodies[body].name;
+            let why = format!(
+                "the shape of body \"{name}\" has a condition (where), of which no surface is known, \
+                 and in implicit runs surfaces touch: describe it by boxes, discs, polygons, ..."
+            );
+            return Err(Error::Input(deck.places.say(&key, &why)));
+        }
+        of_body(world, deck, points, &wanted, &key).map(Some)
+    };
+    (0..deck.bodies.len()).map(of_body).collect()
 }
 
 /// The supports of a deck; `cell`: size of the grid's cells, m. Collective.

@@ -21,6 +21,7 @@
 //! | `supports.rs` | surfaces held by a penalty, wherever they lie on the grid |
 //! | `face_points.rs` | the cells of points on faces, where the mass decides |
 //! | `apart.rs` | no body overlaps a rigid one that comes |
+//! | `facing.rs` | elements of surfaces that face another body |
 //! | `shared_nodes.rs` | where bodies in velocity fields of their own meet |
 //! | `terms/` | contributions to the equations |
 
@@ -28,6 +29,7 @@ pub(crate) mod apart;
 pub(crate) mod border;
 pub mod conditions;
 pub(crate) mod face_points;
+pub(crate) mod facing;
 pub(crate) mod graph;
 pub mod held;
 pub mod in_place;

@@ -13,6 +13,7 @@ use crate::material::Material;
 use crate::parallel::balance::Balance;
 use crate::parallel::{Partition, World};
 use crate::points::Points;
+use crate::surface::Surface;
 
 use super::supports::Support;
 
@@ -36,6 +37,8 @@ pub struct Model<const D: usize> {
     pub loads: Vec<Box<dyn Load<D>>>,
     /// Surfaces that are held off the grid's nodes.
     pub supports: Vec<Support<D>>,
+    /// Surfaces of the bodies that touch others in implicit runs, one per body; empty without any.
+    pub facing: Vec<Option<Surface<D>>>,
     /// Rigid bodies and what touches them.
     pub contacts: Arc<Contacts<D>>,
     /// The field of a `manufactured` load with its derivatives.

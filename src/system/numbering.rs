@@ -22,6 +22,8 @@ pub struct Numbering {
     pub nodes: Vec<usize>,
     /// Whose nodes they are. Nodes of several fields lie at the same node of the grid.
     pub fields: Fields,
+    /// Local index -> node of a field; empty with a single field, where `nodes` says it.
+    pub keys: Vec<usize>,
     /// Local index -> global equation number of the node.
     pub global: Vec<Index>,
     /// Node of a field -> local index.
@@ -111,6 +113,7 @@ impl Numbering {
             total,
             nodes,
             fields: Fields::default(),
+            keys: Vec::new(),
             global: numbers.into_iter().map(|number| number as Index).collect(),
             index,
             halo,
@@ -120,6 +123,7 @@ impl Numbering {
     /// The same nodes, taken as those of `fields`.
     pub fn in_fields(mut self, fields: &Fields) -> Self {
         if !fields.is_single() {
+            self.keys.clone_from(&self.nodes);
             self.nodes.iter_mut().for_each(|node| *node = fields.place(*node));
             self.fields = fields.clone();
         }
@@ -139,6 +143,11 @@ impl Numbering {
     /// Local index of the node of a field that is active here; of a grid node with a single field.
     pub fn local(&self, node: usize) -> Option<usize> {
         self.index.get(node).map(|i| i as usize)
+    }
+
+    /// What [`Self::local`] finds a local node by.
+    pub fn key(&self, local: usize) -> usize {
+        self.keys.get(local).copied().unwrap_or(self.nodes[local])
     }
 
     /// Local index at a grid node of the field that a body moves in.

@@ -91,6 +91,25 @@ impl Populated {
 }
 
 impl Populated {
+    /// The cells owned here as the bodies of one field populate them.
+    pub fn of_field(&self, fields: &Fields, field: usize) -> Self {
+        let of_group = |(group, cells): (usize, &CellBodies)| -> CellBodies {
+            let own = (0..GROUP).filter(|bit| fields.of_body(group * GROUP + bit) == field);
+            let mask = own.fold(0, |mask, bit| mask | 1 << bit);
+            let masked = cells.iter().map(|&(cell, bits)| (cell, bits & mask));
+            // The first group lists the cells of all others, too.
+            masked.filter(|&(_, bits)| group == 0 || bits != 0).collect()
+        };
+        let owned = of_group((0, &self.owned));
+        let further: Vec<_> =
+            self.further.iter().enumerate().map(|(k, c)| of_group((k + 1, c))).collect();
+        let owned = match further.is_empty() {
+            true => owned.into_iter().filter(|&(_, bits)| bits != 0).collect(),
+            false => owned,
+        };
+        Populated { reached: Vec::new(), owned, further }
+    }
+
     /// (cell, field) of the cells owned here, ascending: a cell once for each field of its bodies.
     pub fn in_fields(&self, fields: &Fields) -> Vec<(usize, usize)> {
         if fields.is_single() {

@@ -3,6 +3,7 @@
 use super::border::Border;
 use super::conditions::{Conditions, StepSpan};
 use super::face_points;
+use super::facing::{self, Couple};
 use super::model::Model;
 use super::numbering::Numbering;
 use super::numbering::Touched;
@@ -47,6 +48,9 @@ pub struct Discretisation<const D: usize> {
     pub node_coupling: Vec<f64>,
     /// Local nodes that a Ghost face stabilises.
     pub on_face: Vec<bool>,
+    /// Elements of this rank's points that face another body, in implicit steps; their supports in the
+    /// pattern follow those of the groups and the faces.
+    pub facing: Vec<Couple<D>>,
     /// Cells of the faces owned here.
     pub ghost_cells: Vec<usize>,
     /// Points that carry elements of surfaces on which something acts.
@@ -134,11 +138,16 @@ impl<const D: usize> Discretisation<D> {
         let populated = Populated::find(world, grid, partition, kinds, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {
             Coupling::Matrix | Coupling::Mass => {
-                let (faces, cells) = find_faces(world, model, &populated)?;
+                let (faces, cells) = find_faces(world, model, &populated, fields)?;
                 require_first_jumps(world, basis, &faces)?;
                 (faces, cells)
             }
             Coupling::Diagonal => Default::default(),
+        };
+
+        let facing = match coupling {
+            Coupling::Matrix => facing::find(world, model, points, &influences)?,
+            Coupling::Mass | Coupling::Diagonal => Vec::new(),
         };
 
         // What holds the rows' nodes: where they are those of the populated cells, these are fewer.
@@ -152,11 +161,13 @@ impl<const D: usize> Discretisation<D> {
         if !basis.within_cells() || !fields.is_single() {
             reached.extend_from_slice(&groups.nodes);
         }
+        reached.extend(facing.iter().flat_map(|couple| couple.nodes.iter().copied()));
         let owner_of = |node| partition.owner_of_node(grid, fields.place(node));
         let touched = Touched::assign_by(world, owner_of, reached)?;
         let supports = (0..groups.len())
             .map(|g| groups.nodes(g))
-            .chain(faces.iter().map(|face| face.nodes.as_slice()));
+            .chain(faces.iter().map(|face| face.nodes.as_slice()))
+            .chain(facing.iter().map(|couple| couple.nodes.as_slice()));
         let (numbering, pattern) = match coupling {
             Coupling::Matrix | Coupling::Mass => {
                 pattern::build(world, touched, owner_of, supports)?
@@ -217,6 +228,7 @@ impl<const D: usize> Discretisation<D> {
             numbering,
             pattern,
             node_coupling,
+            facing,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
             carriers: surface::carriers(model, points),
@@ -367,8 +379,30 @@ fn append_nodes_of_fields<const D: usize>(
     }
 }
 
-/// The Ghost faces owned here and the cells beside them.
+/// The Ghost faces owned here, of the nodes of each of the `fields`, and the cells beside them.
 pub(crate) fn find_faces<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    populated: &Populated,
+    fields: &Fields,
+) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
+    if fields.is_single() {
+        return faces_of_bodies(world, model, populated);
+    }
+    let (mut faces, mut cells) = (Vec::new(), Vec::new());
+    for field in 0..fields.count() {
+        let own = populated.of_field(fields, field);
+        let (mut found, beside) = faces_of_bodies(world, model, &own)?;
+        let nodes = found.iter_mut().flat_map(|face| &mut face.nodes);
+        nodes.for_each(|node| *node = fields.at(field, *node));
+        faces.append(&mut found);
+        cells.extend(beside);
+    }
+    Ok((faces, cells))
+}
+
+/// The faces of all bodies in `populated`, of the grid's nodes.
+fn faces_of_bodies<const D: usize>(
     world: &World,
     model: &Model<D>,
     populated: &Populated,

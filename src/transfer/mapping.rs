@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use crate::basis::Influences;
 use crate::mechanics::{Increment, dilation};
+use crate::points::Points;
 use crate::system::numbering::Numbering;
 use crate::system::terms::stress::{StepPoints, displacement_gradient, hoop_increment};
 use crate::tensor::Square;
@@ -194,7 +195,7 @@ fn add_dilation_force<const D: usize>(
 pub fn forces_at_nodes<const D: usize>(
     numbering: &Numbering,
     influences: &Influences<D>,
-    forces: &[[f64; D]],
+    (points, forces): (&Points<D>, &[[f64; D]]),
 ) -> Vec<f64> {
     let mut nodal = vec![0.0; numbering.len() * D];
     for (p, force) in forces.iter().enumerate() {
@@ -202,7 +203,8 @@ pub fn forces_at_nodes<const D: usize>(
             continue;
         }
         for entry in influences.offsets[p]..influences.offsets[p + 1] {
-            let local = numbering.index[influences.nodes[entry]] as usize;
+            let node = numbering.fields.node(points.body[p] as usize, influences.nodes[entry]);
+            let local = numbering.index[node] as usize;
             for (axis, f) in force.iter().enumerate() {
                 nodal[local * D + axis] += influences.weights[entry] * f;
             }

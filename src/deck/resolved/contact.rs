@@ -1,6 +1,6 @@
 //! Rigid bodies and contacts.
 
-use crate::deck::model::{Deck, Friction, Partner, RigidMotion, RigidShape};
+use crate::deck::model::{AnalysisType, Deck, Friction, Partner, RigidMotion, RigidShape};
 
 use super::problem::presence;
 use super::writer::{Writer, array, expression, expressions, inline, number, quote, vector};
@@ -52,7 +52,8 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
         w.line("contact", "friction", friction);
         w.line("contact", "adhesion", number(contact.adhesion));
         w.optional("contact", "max_shear", contact.max_shear.map(number));
-        if let Partner::Rigid(_) = contact.partner {
+        let implicit = deck.analysis.kind != AnalysisType::Explicit;
+        if implicit || matches!(contact.partner, Partner::Rigid(_)) {
             w.line("contact", "penalty", number(contact.penalty));
         }
         presence(w, "contact", contact.presence, Some(0));

@@ -116,7 +116,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "contact",
         header: "[[contact]]",
-        doc: "A body on a rigid body: a penalty keeps the corners of the domains of its points (gimp, cpdi1, cpdi2), or its points (mpm), outside. Two bodies, in explicit runs with a lumped mass: each moves in a velocity field of its own, and impulses at the nodes that both reach keep them apart where their domains meet.",
+        doc: "A body on a rigid body: a penalty keeps the corners of the domains of its points (gimp, cpdi1, cpdi2), or its points (mpm), outside. Two bodies move in fields of their own. In explicit runs, with a lumped mass, impulses at the nodes that both reach keep them apart where their domains meet; in implicit runs, without friction, a penalty keeps the elements of either surface off the other body.",
         keys: &[
             key("name", Text, Optional("the two names with a hyphen between"),
                 "Names the columns of the history, unique."),
@@ -129,7 +129,7 @@ pub const SECTIONS: &[Section] = &[
             key("max_shear", Number, Optional("none"), "Largest tangential traction, whatever the pressure.")
                 .unit("Pa").range(POSITIVE),
             key("penalty", Number, Default("10.0"),
-                "On a rigid body: pressure over depth, times the body's stiffness over the cell size: a pressure p goes p h / (penalty E) deep.")
+                "Pressure over depth, times the body's stiffness (of two bodies the lower one) over the cell size: a pressure p goes p h / (penalty E) deep. Two bodies in explicit runs have none.")
                 .range(POSITIVE),
             key("from", Text, Optional("the first stage"),
                 "The stage it comes with. Two bodies do not slip on each other before.")

@@ -222,11 +222,22 @@ fn of_two_bodies(
     method: Option<&Method>,
 ) -> Got<()> {
     if analysis.is_some_and(|analysis| analysis.kind != AnalysisType::Explicit) {
-        let what = "two bodies touch each other in explicit runs only: equations of implicit runs hold \
-                    one displacement for all bodies at a node, so that they cannot part or slip";
+        let wanted = |name: &str| match table.node(name).and_then(|node| node.number()) {
+            Some(value) => value != 0.0,
+            None => table.given(name),
+        };
+        let what = "is not known between two bodies in implicit runs, which slide on each other freely: \
+                    their elastic slip would have to be kept with pairs of points that change";
         let help = "use analysis.type = \"explicit\", describe one of them as a [[rigid]] body, or \
                     leave this contact out: the bodies then meet without slip";
-        return Err(table.problem_with_help("between", what, help));
+        if let Some(name) = ["friction", "adhesion", "max_shear"].into_iter().find(|n| wanted(n)) {
+            return Err(table.problem_with_help(name, what, help));
+        }
+        if let Some(name) = ["from", "until"].into_iter().find(|name| table.given(name)) {
+            let what = "two bodies that touch in an implicit run do so in all of its stages";
+            return Err(table.problem(name, what));
+        }
+        return Ok(());
     }
     if analysis.is_some() && method.is_some_and(|method| method.mass != Mass::Lumped) {
         let what = "contact of two bodies takes a lumped mass: impulses at a node would move its \

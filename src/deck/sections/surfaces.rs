@@ -6,7 +6,6 @@ use crate::deck::model::{Body, BodySource, BodySurface, Held};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::SIDES;
-use crate::deck::shape::{Form, Shape};
 
 /// Keys of [`body_surface`].
 const OF_BODY: [&str; 3] = ["body", "side", "where"];
@@ -75,7 +74,7 @@ pub fn body_surface(
     let key = if table.given("body") { "body" } else { "" };
     let name = &names[body];
     match &read[body].source {
-        BodySource::Shape { shape, .. } if has_formula(shape) => {
+        BodySource::Shape { shape, .. } if shape.has_condition() => {
             let what = format!(
                 "the shape of body \"{name}\" has a condition (where), of which no surface is known"
             );
@@ -100,14 +99,4 @@ fn condition(table: &Table<'_>, dimension: usize) -> Got<Expression> {
         return Err(table.problem("where", what));
     }
     Ok(condition)
-}
-
-fn has_formula(shape: &Shape) -> bool {
-    match &shape.form {
-        Form::Where(_) => true,
-        Form::Union(parts) | Form::Intersection(parts) | Form::Difference(parts) => {
-            parts.iter().any(has_formula)
-        }
-        _ => false,
-    }
 }

@@ -6,6 +6,7 @@ use std::collections::BTreeMap;
 use nalgebra::DMatrix;
 
 use crate::basis;
+use crate::contact::fields::Fields;
 use crate::contact::start::corners_within;
 use crate::deck::model::{Load, Symmetry};
 use crate::deck::schema::AXES;
@@ -99,7 +100,7 @@ pub fn falls<const D: usize>(
     first: StepSpan,
 ) -> Result<Option<String>> {
     let mut pulled = [false; D];
-    if !model.contacts.is_empty() {
+    if !model.contacts.is_empty() || !model.contacts.body_pairs.is_empty() {
         // It falls onto something.
         return Ok(None);
     }
@@ -311,7 +312,7 @@ fn ties<const D: usize>(
     if !model.grid.element().is_simplex() {
         return Ok(Vec::new());
     }
-    step_system::find_faces(world, model, populated).map(|(faces, _)| faces)
+    step_system::find_faces(world, model, populated, &Fields::default()).map(|(faces, _)| faces)
 }
 
 /// The sums over all ranks of the pieces whose first node is owned here, ascending.

@@ -11,12 +11,14 @@
 //! | both of these as external forces that follow the motion | `following.rs` | |
 //! | their dense blocks | `block.rs` | |
 //! | rigid surfaces | `contact.rs` | formulations.md B.5 |
+//! | two bodies in contact, in implicit steps | `facing.rs` | |
 //! | Ghost stiffness | `ghost.rs` | Ghost eq. 27, 28 |
 //! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
 //! | products of the last two | `scalar.rs` | |
 
 mod block;
 pub mod contact;
+pub mod facing;
 pub(crate) mod following;
 pub mod ghost;
 pub(crate) mod inertia;

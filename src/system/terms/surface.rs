@@ -66,7 +66,7 @@ enum Kind<'a, const D: usize> {
 }
 
 /// Weights up to this are those of round-off.
-const NO_WEIGHT: f64 = 1e-12;
+pub(crate) const NO_WEIGHT: f64 = 1e-12;
 
 /// What a support bears, this rank's share: force, sum of magnitudes, torque about z through the
 /// origin, and volume of the points that carry it.
@@ -458,7 +458,7 @@ fn add_products<const D: usize, T>(
 }
 
 /// F of a point in the axes of the grid.
-fn in_space<const D: usize>(points: &Points<D>, p: usize) -> dense::Square<D> {
+pub(crate) fn in_space<const D: usize>(points: &Points<D>, p: usize) -> dense::Square<D> {
     let gradient = &points.deformation_gradient[p];
     std::array::from_fn(|i| std::array::from_fn(|j| gradient[(i, j)]))
 }
@@ -470,7 +470,10 @@ pub fn place_of<const D: usize>(points: &Points<D>, p: usize, own: &Carried<D>) 
 }
 
 /// det F F^-T A (Nanson).
-fn carried_area<const D: usize>(gradient: &dense::Square<D>, area: &[f64; D]) -> [f64; D] {
+pub(crate) fn carried_area<const D: usize>(
+    gradient: &dense::Square<D>,
+    area: &[f64; D],
+) -> [f64; D] {
     let (inverse, determinant) = dense::inverse(gradient);
     std::array::from_fn(|i| determinant * (0..D).map(|j| inverse[j][i] * area[j]).sum::<f64>())
 }

@@ -81,6 +81,34 @@ pub struct Finished<const D: usize> {
     told: Option<Vec<Told<D>>>,
 }
 
+/// What two bodies exchange in a step, this rank's share.
+#[derive(Debug, Clone, Default)]
+pub struct Met {
+    /// Index into the deck's contacts.
+    pub index: usize,
+    /// On the second body, N.
+    pub force: [f64; 3],
+    /// m2 (m in 2D)
+    pub area: f64,
+    /// Σ A times the slip of the step, m3 (m2 in 2D).
+    pub slid: f64,
+    /// Of the deepest overlap, m.
+    pub depth: f64,
+    /// Dissipated by friction in the step, J.
+    pub friction: f64,
+    /// Lost along the normals, where bodies meet, J.
+    pub impact: f64,
+    /// In penalties at the step's end, J.
+    pub energy: f64,
+}
+
+impl Met {
+    /// Nothing so far.
+    pub fn of(index: usize) -> Self {
+        Met { index, ..Met::default() }
+    }
+}
+
 /// A corner that touches.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Corner {

@@ -1,0 +1,392 @@
+//! Contact of two deformable bodies in implicit runs: Hertz, tangent, what is kept, ranks, restart.
+
+mod common;
+#[path = "common/program.rs"]
+mod program;
+
+use std::path::Path;
+
+use common::on_ranks;
+use common::product::product;
+use common::run::{Results, Run, relative_difference};
+use mpi::environment::Universe;
+use mpi::traits::*;
+use mpm_par::deck;
+use mpm_par::parallel::World;
+use mpm_par::run::setup;
+use mpm_par::system::scatter::BlockMatrix;
+use mpm_par::system::step_system::Discretisation;
+use mpm_par::system::terms::facing::FacingTerm;
+use mpm_par::system::terms::term::{At, Part};
+
+fn last(results: &Results, name: &str) -> f64 {
+    *results.history(name).last().expect("a row")
+}
+
+/// Halves of two equal cylinders (axisymmetric: balls) of radius 2, of which the upper one is driven.
+fn round(h: f64) -> String {
+    format!(
+        r#"
+[analysis]
+type = "quasi-static"
+steps = 3
+max_iterations = 25
+[method]
+basis = "gimp"
+domain_update = "stretch"
+[grid]
+type = "lattice"
+origin = [0.0, -1.05]
+size = [1.05, 2.1]
+h = {h}
+[material.rubber]
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[body]]
+name = "low"
+material = "rubber"
+shape.intersection = [
+  {{ disc = {{ centre = [0, -2], radius = 2 }} }},
+  {{ box = {{ min = [0, -1.05], max = [1.05, 0] }} }},
+]
+[[body]]
+name = "high"
+material = "rubber"
+shape.intersection = [
+  {{ disc = {{ centre = [0, 2], radius = 2 }} }},
+  {{ box = {{ min = [0, 0], max = [1.05, 1.05] }} }},
+]
+[[boundary]]
+name = "base"
+where = {{ side = "bottom" }}
+fix = ["x", "y"]
+[[boundary]]
+name = "symmetry"
+where = {{ side = "left" }}
+fix = ["x"]
+[[boundary]]
+name = "top"
+where = {{ box = {{ min = [0, 0.99], max = [1.05, 1.05] }} }}
+fix = ["x"]
+displacement = {{ y = -0.025 }}
+[[contact]]
+between = ["low", "high"]
+[[probe]]
+name = "low"
+near = [0, -0.001]
+fields = ["stress"]
+[[probe]]
+name = "high"
+near = [0, 0.001]
+fields = ["stress"]
+"#
+    )
+}
+
+/// Of a column of `probes.csv` the last value.
+fn probed(results: &Results, name: &str) -> f64 {
+    let text = results.text("probes.csv");
+    let mut rows = text.lines();
+    let column = rows.next().expect("names").split(',').position(|own| own.starts_with(name));
+    let row = rows.next_back().expect("a row");
+    row.split(',').nth(column.expect("a column")).expect("a cell").parse().expect("a number")
+}
+
+/// Two equal cylinders: 1/R = 1/2 + 1/2, E* = E / (2 (1 - nu^2)), a = sqrt(4 F R / (pi E*)),
+/// p_max = 2 F / (pi a). The half width is counted in elements, each 5 % of it.
+#[test]
+fn two_cylinders_press_as_hertz_says() {
+    let results = Run::text(&round(0.015)).results();
+    let force = 2.0 * last(&results, "contact.low-high.y");
+    let pi = std::f64::consts::PI;
+    let width = (4.0 * force / (pi * 1e6 / 1.82)).sqrt();
+    let peak = 2.0 * force / (pi * width);
+    let found = last(&results, "contact.low-high.area");
+    assert!((found / width - 1.0).abs() < 0.05, "half width {found}, Hertz {width}");
+    for side in ["low", "high"] {
+        let found = -probed(&results, &format!("{side}.stress.yy"));
+        assert!((found / peak - 1.0).abs() < 0.03, "{side}: p_max {found}, Hertz {peak}");
+    }
+    // Action is reaction, and both are those of the boundaries.
+    for name in ["reaction.base.y", "reaction.top.y"] {
+        let reaction = 2.0 * last(&results, name).abs();
+        assert!((reaction / force - 1.0).abs() < 1e-9, "{name}: {reaction} {force}");
+    }
+    require_newtons_order(&results);
+}
+
+/// Two equal balls, in axisymmetry: a^3 = 3 F R / (4 E*), p_max = 3 F / (2 pi a^2).
+#[test]
+fn two_balls_press_as_hertz_says() {
+    let text = round(0.021).replace("steps = 3", "steps = 3\nsymmetry = \"axisymmetric\"");
+    let (start, end) = (
+        text.find("[[boundary]]\nname = \"symmetry\"").unwrap(),
+        text.find("[[boundary]]\nname = \"top\"").unwrap(),
+    );
+    let results = Run::text(&format!("{}{}", &text[..start], &text[end..])).results();
+    let force = last(&results, "contact.low-high.y");
+    let pi = std::f64::consts::PI;
+    let radius = (0.75 * force / (1e6 / 1.82)).cbrt();
+    let peak = 1.5 * force / (pi * radius * radius);
+    let found = (last(&results, "contact.low-high.area") / pi).sqrt();
+    assert!((found / radius - 1.0).abs() < 0.03, "radius {found}, Hertz {radius}");
+    let pressed = -probed(&results, "low.stress.yy");
+    assert!((pressed / peak - 1.0).abs() < 0.03, "p_max {pressed}, Hertz {peak}");
+    let reaction = last(&results, "reaction.base.y");
+    assert!((reaction / force - 1.0).abs() < 1e-9, "{reaction} {force}");
+}
+
+/// In each step the last residuals above round-off, once the elements that touch stay: the error is at
+/// least raised to the power 1.8.
+fn require_newtons_order(results: &Results) {
+    let text = results.text("residuals.csv");
+    let mut steps: Vec<Vec<f64>> = Vec::new();
+    for row in text.lines().skip(1) {
+        let cells: Vec<f64> = row.split(',').map(|cell| cell.parse().expect("a number")).collect();
+        if cells[1] == 0.0 || steps.is_empty() {
+            steps.push(Vec::new());
+        }
+        steps.last_mut().expect("a step").push(cells[2]);
+    }
+    for errors in steps {
+        let [.., before, end] = errors[..] else { panic!("{errors:?}") };
+        // Above 1e-6 the order can be seen before round-off ends it at about 1e-13.
+        let order = end.max(1e-13).ln() / before.ln();
+        assert!(order > 1.8 || before < 1e-6, "order {order}: {errors:?}");
+    }
+}
+
+/// A soft block under a hard one, joined nowhere on a grid line: the springs L / E of both and that of
+/// the penalty, h / (f E), bear one pressure (small strains), which both bodies have everywhere.
+#[test]
+fn blocks_of_two_materials_bear_one_pressure() {
+    let text = r#"
+[analysis]
+type = "quasi-static"
+steps = 1
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+size = [1.0, 2.5]
+h = 0.25
+[material.rubber]
+model = "hencky"
+young = 1e6
+poisson = 0.0
+[material.hard]
+model = "hencky"
+young = 4e6
+poisson = 0.0
+[[body]]
+name = "low"
+material = "rubber"
+shape = { box = { min = [0, 0], max = [1.0, 1.1] } }
+[[body]]
+name = "high"
+material = "hard"
+shape = { box = { min = [0, 1.1], max = [1.0, 2.0] } }
+[[boundary]]
+name = "base"
+where = { side = "bottom" }
+fix = ["y"]
+[[boundary]]
+name = "left"
+where = { side = "left" }
+fix = ["x"]
+[[boundary]]
+name = "top"
+where = { box = { min = [0, 2.0], max = [1.0, 2.0] } }
+displacement = { y = -1e-4 }
+[[contact]]
+between = ["low", "high"]
+[output]
+fields = ["stress", "contact_force"]
+"#;
+    let results = Run::text(text).results();
+    let pressure = 1e-4 / (1.1 / 1e6 + 0.9 / 4e6 + 0.25 / (10.0 * 1e6));
+    let force = last(&results, "contact.low-high.y");
+    assert!((force / pressure - 1.0).abs() < 2e-3, "{force} {pressure}");
+    let points = results.points(1);
+    for stress in points.component("stress", 3) {
+        assert!((-stress / pressure - 1.0).abs() < 0.02, "{stress} {pressure}");
+    }
+    // What the points of either body are told is the force as their own elements see it.
+    let told = points.component("contact_force", 1);
+    let (up, down): (f64, f64) =
+        (told.iter().filter(|f| **f > 0.0).sum(), told.iter().filter(|f| **f < 0.0).sum());
+    assert!((up / force - 1.0).abs() < 1e-3 && (down / force + 1.0).abs() < 1e-3, "{up} {down}");
+}
+
+/// Discs bounce off each other in implicit steps as either does off a smooth wall in the middle; momenta
+/// are kept to round-off.
+#[test]
+fn discs_bounce_in_implicit_steps() {
+    let text = std::fs::read_to_string(common::run::input("two-discs")).expect("a deck");
+    let text = text
+        .replace("type = \"explicit\"", "type = \"implicit-dynamic\"")
+        .replace("cfl = 0.4", "steps = 80")
+        .replace("mass = \"lumped\"\n", "");
+    let results = Run::text(&text).results();
+    let size = 1000.0 * 0.04 * std::f64::consts::PI;
+    for column in ["momentum_x", "momentum_y", "angular_momentum_z"] {
+        let most = results.history(column).iter().fold(0.0f64, |m, p| m.max(p.abs()));
+        assert!(most < 1e-11 * size, "{column}: {most:e}");
+    }
+    let energy = |row: usize| -> f64 {
+        let parts = ["energy_kinetic", "energy_strain", "energy_contact"];
+        parts.iter().map(|name| results.history(name)[row]).sum()
+    };
+    let ratio = energy(results.history("dt").len() - 1) / energy(0);
+    assert!((0.98..1.001).contains(&ratio), "{ratio}");
+    let impulse = |results: &Results, column: &str| -> f64 {
+        let steps = results.history("dt");
+        results.history(column).iter().zip(&steps).map(|(force, dt)| force * dt).sum()
+    };
+    let push = impulse(&results, "contact.left-right.x");
+    let (start, end) =
+        (text.find("[[body]]\nname = \"right\"").unwrap(), text.find("[[contact]]").unwrap());
+    let plane = "[[rigid]]\nname = \"wall\"\n\
+                 shape = { half_space = { point = [0, 0], normal = [-1, 0] } }\n\n";
+    let wall = format!("{}{plane}{}", &text[..start], text[end..].replace("right", "wall"));
+    let off_wall = -impulse(&Run::text(&wall).results(), "reaction.wall.x");
+    assert!((push / off_wall - 1.0).abs() < 0.02, "{push} {off_wall}");
+}
+
+/// Rank boundaries go through the bodies that touch, and a restart repeats the run bit by bit.
+#[test]
+fn ranks_agree_and_a_restart_is_bitwise() {
+    let text = round(0.05)
+        .replace("[[contact]]", "[output]\ncheckpoint = { every = 1, keep = 3 }\n[[contact]]");
+    let run = Run::text(&text).set("parallel.brick=1");
+    let one = run.results();
+    for ranks in [2, 3] {
+        let more = run.clone().ranks(ranks).results();
+        for column in
+            ["contact.low-high.y", "contact.low-high.area", "energy_contact", "energy_strain"]
+        {
+            let wrong = relative_difference(&more.history(column), &one.history(column));
+            assert!(wrong < 1e-8, "{ranks} ranks, {column}: {wrong:e}");
+        }
+    }
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let deck = folder.path().join("deck.toml");
+    std::fs::write(&deck, text).expect("a deck");
+    for ranks in [1, 2] {
+        let at = |name: &str| folder.path().join(format!("{name}-{ranks}"));
+        program::run_well(ranks, &deck, &at("whole"), &[]);
+        let middle = at("whole").join("checkpoint-000002.h5").display().to_string();
+        program::run_well(ranks, &deck, &at("part"), &["--restart", &middle]);
+        assert_eq!(program::history(&at("part"))[..], program::history(&at("whole"))[2..]);
+    }
+}
+
+fn tangents(universe: &Universe) {
+    let world = World::new(universe.world().duplicate());
+    for basis in ["gimp", "mpm", "cpdi2"] {
+        tangent::<2>(&world, basis);
+    }
+    tangent::<3>(&world, "gimp");
+}
+
+/// The tangent times a direction is the central difference of the force, and the forces on both bodies
+/// are opposite, in sum and in moment.
+fn tangent<const D: usize>(world: &World, basis: &str) {
+    let list = |value: f64| format!("{:?}", vec![value; D]);
+    let (mut top, mut bottom) = (vec![2.9; D], vec![0.4; D]);
+    (top[D - 1], bottom[D - 1]) = (1.4, 1.4);
+    let text = format!(
+        "[analysis]\ntype = \"quasi-static\"\nsteps = 1\n[method]\nbasis = \"{basis}\"\n\
+         [grid]\ntype = \"lattice\"\norigin = {}\nsize = {}\nh = 1.0\n\
+         [material.m]\nmodel = \"hencky\"\nyoung = 1e6\npoisson = 0.3\n\
+         [[body]]\nname = \"a\"\nmaterial = \"m\"\nshape = {{ box = {{ min = {}, max = {top:?} }} }}\n\
+         [[body]]\nname = \"b\"\nmaterial = \"m\"\nshape = {{ box = {{ min = {bottom:?}, max = {} }} }}\n\
+         [[contact]]\nbetween = [\"a\", \"b\"]\n",
+        list(-1.0),
+        list(5.0),
+        list(0.2),
+        list(2.7),
+    );
+    let deck = deck::read(Path::new("blocks.toml"), &text, &[]).expect("a deck");
+    let (model, points) = setup::prepare::<D>(world, deck).expect("a model");
+    let mesh = Discretisation::new(world, &model, &points).expect("a grid side");
+    let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+    let count = numbering.len() * D;
+    let v: Vec<f64> = (0..count).map(|i| (1.1 + 1.7 * i as f64).sin()).collect();
+    let at = |size: f64| -> Vec<f64> {
+        let of = |i: usize| {
+            let field = numbering.fields.of_node(numbering.key(i / D));
+            // Body a upwards into b.
+            let into = if i % D == D - 1 && field == 0 { 0.1 } else { 0.0 };
+            into + 0.02 * (0.3 + 1.7 * i as f64).sin() + size * v[i]
+        };
+        (0..count).map(of).collect()
+    };
+    let term = FacingTerm::new(&model, &mesh).expect("bodies that face each other");
+    let force = |u: &[f64], mut matrix: Option<&mut BlockMatrix<D>>| {
+        let mut force = vec![0.0; count];
+        for part in [Part::Reaching, Part::Inner] {
+            term.add(part, At { pattern, displacement: u }, &mut force, matrix.as_deref_mut());
+        }
+        force
+    };
+    let mut matrix = BlockMatrix::<D>::zeros(pattern);
+    let now = force(&at(0.0), Some(&mut matrix));
+    let size = now.iter().map(|f| f.abs()).sum::<f64>();
+    assert!(size > 0.0, "{basis}: nothing touches");
+    let mut sums = [0.0; 6];
+    for (node, f) in now.chunks_exact(D).enumerate() {
+        let x = model.grid.node_position(numbering.nodes[node]);
+        for i in 0..D {
+            let j = (i + 1) % D;
+            sums[i] += f[i];
+            sums[3 + i] += x[i] * f[j] - x[j] * f[i];
+        }
+    }
+    assert!(sums.iter().all(|sum| sum.abs() < 1e-12 * size), "{D}D {basis}: {sums:?} of {size}");
+    let along = product(pattern, &matrix, &v);
+    let (more, less) = (force(&at(1e-7), None), force(&at(-1e-7), None));
+    let size = along.iter().fold(0.0f64, |m, k| m.max(k.abs()));
+    for dof in 0..count {
+        let error = ((more[dof] - less[dof]) / 2e-7 - along[dof]).abs() / size;
+        assert!(error < 1e-6, "{D}D {basis}: {error:e}");
+    }
+}
+
+#[test]
+fn the_tangent_of_two_bodies_is_that_of_their_forces() {
+    on_ranks("the_tangent_of_two_bodies_is_that_of_their_forces", &[1], tangents);
+}
+
+#[test]
+fn what_two_bodies_cannot_do_in_implicit_runs_is_told_with_the_cure() {
+    let third = "[[body]]\nname = \"third\"\nmaterial = \"rubber\"\n\
+                 shape = { box = { min = [0.5, 0.7], max = [0.6, 0.8] } }\noverlap = \"allow\"\n\
+                 [[contact]]";
+    for (from, to, expected) in [
+        (
+            "between = [\"low\", \"high\"]",
+            "between = [\"low\", \"high\"]\nfriction = 0.3",
+            &["friction", "explicit"][..],
+        ),
+        (
+            "between = [\"low\", \"high\"]",
+            "between = [\"low\", \"high\"]\nadhesion = 3.0",
+            &["adhesion", "[[rigid]]"],
+        ),
+        ("[[contact]]", third, &["by way of \"third\"", "name it in contacts"]),
+        (
+            "{ disc = { centre = [0, 2], radius = 2 } }",
+            "{ where = \"x^2 + (y-2)^2 < 4\" }",
+            &["of which no surface is known"],
+        ),
+    ] {
+        let text = round(0.05).replacen(from, to, 1);
+        let outcome = Run::text(&text).attempt();
+        let said = outcome.said();
+        assert_eq!(outcome.code, 2, "{said}");
+        assert!(expected.iter().all(|part| said.contains(part)), "{to}:\n{said}");
+        assert!(!outcome.folder.path().join("out").exists(), "{to}");
+    }
+}
