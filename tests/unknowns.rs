@@ -1,6 +1,6 @@
 //! Unknowns per node apart from the dimension of space: one (heat) and three (made-up blocks) on the
 //! active nodes of a plane problem, through the program's numbering, sparsity, rows in the solver's
-//! memory, conditions and Ghost faces.
+//! memory, conditions and Ghost faces; and one unknown through Newton's method and a step's equations.
 
 mod common;
 
@@ -9,17 +9,22 @@ use std::path::Path;
 use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
-use mpm_par::analysis::solver::{self, Linear};
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
+use mpm_par::analysis::solver::{self, Linear, Shape};
 use mpm_par::deck;
+use mpm_par::deck::model::{Frame, InvertedIterates};
 use mpm_par::parallel::World;
 use mpm_par::petsc::{Ksp, Session};
 use mpm_par::run::setup;
+use mpm_par::system::conditions::Conditions;
 use mpm_par::system::held::Held;
 use mpm_par::system::in_place::{InPlace, RowAddresses};
 use mpm_par::system::scatter::{BlockMatrix, BlockRows, add_support};
 use mpm_par::system::step_system::Discretisation;
-use mpm_par::system::terms::ghost::ghost_matrix;
+use mpm_par::system::terms::block::add_block;
+use mpm_par::system::terms::ghost::{Ghost, ghost_matrix};
 use mpm_par::system::terms::stress::StepPoints;
+use mpm_par::system::terms::term::{At, Health, Part, Term};
 
 /// The points fill whole cells, four each, so that linear fields are exact at inner nodes.
 const PLATE: &str = r#"
@@ -172,4 +177,118 @@ fn blocks(universe: &Universe) {
 #[test]
 fn one_more_unknown_than_axes() {
     on_ranks("one_more_unknown_than_axes", &[1, 2, 3], blocks);
+}
+
+/// Σ_p V k(g) ∇S · g with g = ∇T and k = 1 + |g|²: conduction that depends on the gradient.
+struct Conduction<'a> {
+    step: StepPoints<'a, 2>,
+}
+
+impl Term<1> for Conduction<'_> {
+    fn add_shares(
+        &self,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        mut rows: Option<&mut InPlace<'_, 1>>,
+    ) -> Health {
+        let step = self.step;
+        let which = match part {
+            Part::Reaching => &step.border.reaching,
+            Part::Inner => &step.border.inner,
+        };
+        for group in which.iter().cloned().flatten() {
+            let nodes = step.nodes_of_group(group);
+            let mut block = vec![0.0; nodes.len() * nodes.len()];
+            for &p in step.groups.points(group) {
+                let (slopes, volume) = (
+                    &step.influences.gradients[step.influences.row(p)],
+                    step.points.volume_initial[p],
+                );
+                let mut g = [0.0; 2];
+                for (&node, slope) in nodes.iter().zip(slopes) {
+                    g[0] += slope[0] * at.displacement[node as usize];
+                    g[1] += slope[1] * at.displacement[node as usize];
+                }
+                let k = 1.0 + g[0] * g[0] + g[1] * g[1];
+                let along = |slope: &[f64; 2]| slope[0] * g[0] + slope[1] * g[1];
+                for (a, s) in slopes.iter().enumerate() {
+                    force[nodes[a] as usize] += volume * k * along(s);
+                    for (b, q) in slopes.iter().enumerate() {
+                        let dot = s[0] * q[0] + s[1] * q[1];
+                        block[a * nodes.len() + b] +=
+                            volume * (k * dot + 2.0 * along(s) * along(q));
+                    }
+                }
+            }
+            if let Some(rows) = rows.as_deref_mut() {
+                add_block::<1, _>(at.pattern, group, nodes, &block, rows);
+            }
+        }
+        Health::default()
+    }
+}
+
+/// The left edge is held, a flux q = k g enters at the right one: the field is linear, with g (1 + g²) = q.
+fn heat_by_newton(universe: &Universe) {
+    const SLOPE: f64 = 0.7;
+    let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
+    let world = &World::new(universe.world().duplicate());
+    let deck = deck::read(Path::new("plate.toml"), PLATE, &[]).expect("a sound deck");
+    let (model, points) = setup::prepare::<2>(world, deck).expect("a sound problem");
+    let mesh = Discretisation::new(world, &model, &points).expect("a system");
+    let step = mesh.step_points(&points, &model.materials);
+    let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+
+    let places: Vec<[f64; 2]> =
+        numbering.nodes.iter().map(|&node| model.grid.node_position(node)).collect();
+    let exact: Vec<f64> = places.iter().map(|x| 1.0 + SLOPE * x[0]).collect();
+    let fixed: Vec<bool> = places.iter().map(|x| x[0] <= 0.0).collect();
+    // Of an edge's node: the half cells beside it.
+    let entering = |x: &[f64; 2]| match (x[0] >= 4.0, x[1] <= 0.0 || x[1] >= 2.0) {
+        (true, true) => 0.25 * SLOPE * (1.0 + SLOPE * SLOPE),
+        (true, false) => 0.5 * SLOPE * (1.0 + SLOPE * SLOPE),
+        (false, _) => 0.0,
+    };
+    let held = |(fixed, value): (&bool, &f64)| if *fixed { *value } else { 0.0 };
+    let conditions = Conditions {
+        increment: fixed.iter().zip(&exact).map(held).collect(),
+        fixed: fixed.clone(),
+        ..Conditions::default()
+    };
+    let ghost = Ghost::new(world, &mesh).expect("faces").expect("the plate has Ghost faces");
+    let equations = StepEquations {
+        conditions: &conditions,
+        left_out: &vec![false; numbering.len()],
+        external_owned: places[..numbering.owned].iter().map(entering).collect(),
+        terms: vec![Box::new(Conduction { step }), Box::new(ghost)],
+    };
+    let settings = NewtonSettings {
+        tolerance: 1e-12,
+        max_evaluations: 12,
+        frame: Frame::Previous,
+        inverted: InvertedIterates::Reject,
+        symmetric: true,
+    };
+    let mut problem = Equilibrium::<2, 1>::of_terms(world, &model.grid, &mesh, equations, settings);
+    let mut matrix = solver::block_matrix::<1>(world, numbering, pattern).expect("a matrix");
+    let mut solution = matrix.vector().expect("a vector");
+    let shape = Shape { symmetric: true, search: false };
+    let mut newton =
+        solver::newton(world, Linear::DirectOnOne, shape, false, 12).expect("a solver");
+    let outcome = newton.solve(&mut problem, &mut matrix, &mut solution).expect("a solve");
+    assert!(outcome.converged && outcome.iterations >= 3, "{outcome:?}");
+    let found = solution.values().expect("values");
+    for (dof, value) in found.iter().enumerate() {
+        assert!((value - exact[dof]).abs() < 1e-10, "{dof}: {value} {}", exact[dof]);
+    }
+    // Quadratic: the last errors square, down to round-off.
+    let errors = &problem.errors;
+    let late = errors.windows(2).find(|pair| pair[0] < 1e-2).expect("an error below 1e-2");
+    assert!(late[1] < 100.0 * late[0] * late[0] + 1e-13, "{errors:?}");
+}
+
+#[test]
+fn one_unknown_by_newtons_method() {
+    on_ranks("one_unknown_by_newtons_method", &[1, 2, 3], heat_by_newton);
 }

@@ -78,25 +78,29 @@ const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
 const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
 /// The hierarchy under an assembled system of displacements, which may be `symmetric` or not;
-/// `ties`: what penalties do to it. Collective.
-pub fn of_system<const D: usize>(
+/// `ties`: what penalties do to it. `None` for `N` unknowns per node that are no displacements, whose
+/// smooth modes it does not know. Collective.
+pub fn of_system<const D: usize, const N: usize>(
     world: &World,
     grid: &Grid<D>,
     numbering: &Numbering,
     rows: &Assembled,
-    ties: &Ties<D>,
+    ties: &Ties<N>,
     symmetric: bool,
 ) -> Result<Option<Hierarchy>> {
+    if N != D {
+        return Ok(None);
+    }
     let nodes = Nodes {
         position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
         key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
         ..nodes_of(numbering)
     };
     match (D, symmetric) {
-        (2, true) => build::<D, 3>(world, &nodes, rows, ties),
-        (2, false) => build_unsymmetric::<D, 3>(world, &nodes, rows, ties),
-        (_, true) => build::<D, 6>(world, &nodes, rows, ties),
-        (_, false) => build_unsymmetric::<D, 6>(world, &nodes, rows, ties),
+        (2, true) => build::<N, 3>(world, &nodes, rows, ties),
+        (2, false) => build_unsymmetric::<N, 3>(world, &nodes, rows, ties),
+        (_, true) => build::<N, 6>(world, &nodes, rows, ties),
+        (_, false) => build_unsymmetric::<N, 6>(world, &nodes, rows, ties),
     }
 }
 

@@ -106,7 +106,7 @@ fn bytes_per_point<const D: usize>(deck: &crate::deck::Deck) -> f64 {
 }
 
 /// Volume of each body's points beside that of its shape, where the two differ or a shape is not
-/// filled cell by cell. Collective.
+/// filled cell by cell; empty on all ranks but the first. Collective.
 fn filling<const D: usize>(
     world: &World,
     model: &Model<D>,
@@ -136,6 +136,10 @@ fn filling<const D: usize>(
         Some((format!("body {}", body.name), text))
     };
     let seeded = world.sum_slice(&seeded);
+    if world.rank() > 0 {
+        // The first rank tells it; volumes of shapes take some hundredths of a second.
+        return Vec::new();
+    }
     // Decks of very many bodies need no line for each.
     model.deck.bodies.iter().zip(seeded).take(LINES).filter_map(row).collect()
 }

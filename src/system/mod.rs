@@ -26,7 +26,7 @@
 //! | `terms/` | contributions to the equations |
 
 pub(crate) mod apart;
-pub(crate) mod border;
+pub mod border;
 pub mod conditions;
 pub(crate) mod face_points;
 pub(crate) mod facing;

@@ -9,7 +9,7 @@ use super::Equilibrium;
 /// Cells that a node may move in a step for the residual to be judged by the size of its terms.
 const FARTHEST: f64 = 1e3;
 
-impl<const D: usize> Equilibrium<'_, D> {
+impl<const D: usize, const N: usize> Equilibrium<'_, D, N> {
     /// Lagrangian eq. 40; 1 where a residual stands against no action at all, 0 where there is
     /// neither.
     pub(super) fn normalised_error(&mut self) -> f64 {
@@ -34,7 +34,7 @@ impl<const D: usize> Equilibrium<'_, D> {
     pub(super) fn is_round_off(&self) -> Result<bool> {
         // Sizes take a pass over the points. A residual far above those of strains and moves of a
         // whole cell in the stiffest place needs none.
-        let (cell, count) = (self.grid.cell_size(), (self.numbering.total * D) as f64);
+        let (cell, count) = (self.grid.cell_size(), (self.numbering.total * N) as f64);
         let largest = self.diagonal_largest * cell * count.sqrt() + self.actions_norm;
         let moves = self.world.max(self.displacement.iter().fold(0.0, |m, u| u.abs().max(m)));
         // The iterate of a singular system may be of any size, and its terms with it.
@@ -52,13 +52,13 @@ impl<const D: usize> Equilibrium<'_, D> {
         numbering.halo.reverse_add(self.world, &mut size, 1)?;
         size.truncate(numbering.owned);
         let norm = |u: &[f64]| u.iter().map(|u| u * u).sum::<f64>().sqrt();
-        let moved: Vec<f64> = self.displacement.chunks_exact(D).map(norm).collect();
+        let moved: Vec<f64> = self.displacement.chunks_exact(N).map(norm).collect();
         for term in &self.terms {
             term.add_sizes(pattern, &moved, &mut size);
         }
         let explained = self.counted().all(|dof| {
             let action = self.external_owned[dof] + self.reaction_owned[dof];
-            let size = size[dof / D] + self.external_owned[dof].abs() + action.abs();
+            let size = size[dof / N] + self.external_owned[dof].abs() + action.abs();
             round_off::explains(size, action - self.internal_owned[dof])
         });
         Ok(!self.world.any(!explained))

@@ -13,7 +13,7 @@ use std::time::Instant;
 
 use super::{Equilibrium, Tangent};
 
-impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
+impl<const D: usize, const N: usize> NewtonProblem for Equilibrium<'_, D, N> {
     /// With the tangent, unless this is likely the step's last evaluation.
     fn residual(&mut self, x: &[f64], f: &mut [f64], matrix: &mut Matrix) -> Result<bool> {
         let matrix = (!self.expects_convergence()).then_some(matrix);
@@ -41,7 +41,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
 
     /// Moves the columns of prescribed displacements to the right-hand side.
     fn before_solve(&mut self, rhs: &mut [f64]) -> Result<()> {
-        let mut prescribed = vec![0.0; self.numbering.len() * D];
+        let mut prescribed = vec![0.0; self.numbering.len() * N];
         let mut any = false;
         for (dof, value) in rhs.iter().enumerate() {
             if self.held.holds(dof) && *value != 0.0 {
@@ -52,7 +52,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
         if !self.world.any(any) {
             return Ok(());
         }
-        self.numbering.halo.forward(self.world, &mut prescribed, D)?;
+        self.numbering.halo.forward(self.world, &mut prescribed, N)?;
         self.held.move_columns(&prescribed, rhs);
         Ok(())
     }
@@ -100,7 +100,7 @@ impl<const D: usize> NewtonProblem for Equilibrium<'_, D> {
     }
 }
 
-impl<const D: usize> Levelled for Equilibrium<'_, D> {
+impl<const D: usize, const N: usize> Levelled for Equilibrium<'_, D, N> {
     fn levels(&mut self) -> &mut Levels {
         &mut self.levels
     }
@@ -116,7 +116,7 @@ impl<const D: usize> Levelled for Equilibrium<'_, D> {
         self.with_rows(matrix, |rows| {
             let (world, of, ties) = (self.world, self.numbering, self.ties(rows)?);
             if self.symmetric() {
-                return amg::tie::<D>(world, of, rows, &ties.nodes, smoother);
+                return amg::tie::<N>(world, of, rows, &ties.nodes, smoother);
             }
             let part = amg::surrogate(world, of, rows, &ties)?;
             amg::tie(world, of, &part, &ties.nodes, smoother)
@@ -130,19 +130,19 @@ impl<const D: usize> Levelled for Equilibrium<'_, D> {
         finest: &mut BlockProduct<f32>,
     ) -> Result<()> {
         self.with_rows(matrix, |rows| {
-            amg::fill::<_, D>(rows, exact);
+            amg::fill::<_, N>(rows, exact);
             if self.symmetric() {
                 exact.round_into(finest);
                 return Ok(());
             }
             let part = amg::surrogate(self.world, self.numbering, rows, &self.ties(rows)?)?;
-            amg::fill::<_, D>(&part, finest);
+            amg::fill::<_, N>(&part, finest);
             Ok(())
         })
     }
 }
 
-impl<const D: usize> Equilibrium<'_, D> {
+impl<const D: usize, const N: usize> Equilibrium<'_, D, N> {
     /// Whether the coming iterate will hardly need a tangent.
     fn expects_convergence(&self) -> bool {
         converges_next(&self.errors, self.settings.tolerance)
@@ -150,12 +150,12 @@ impl<const D: usize> Equilibrium<'_, D> {
 
     /// f_react = f_int(old) + K (x - x_old) - f_ext on the fixed degrees of freedom.
     fn accumulate_reactions(&mut self, x: &[f64]) -> Result<()> {
-        let mut change = vec![0.0; self.numbering.len() * D];
+        let mut change = vec![0.0; self.numbering.len() * N];
         for (c, (new, old)) in change.iter_mut().zip(x.iter().zip(&self.previous_owned)) {
             *c = new - old;
         }
-        self.numbering.halo.forward(self.world, &mut change, D)?;
-        for (dof, sum) in self.held.reactions::<D>(self.pattern, &change) {
+        self.numbering.halo.forward(self.world, &mut change, N)?;
+        for (dof, sum) in self.held.reactions::<N>(self.pattern, &change) {
             self.reaction_owned[dof] =
                 self.internal_previous[dof] + sum - self.external_previous[dof];
         }

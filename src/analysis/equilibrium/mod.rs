@@ -23,7 +23,7 @@ use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
 use crate::system::step_system::Discretisation;
 use crate::system::terms::Term;
-use crate::system::terms::following::Following;
+use crate::system::terms::following::{Follow, Following};
 use crate::system::terms::ghost::Ghost;
 use crate::system::terms::stress::{StepPoints, Stress};
 use crate::system::terms::term::{At, Health, Part};
@@ -44,8 +44,8 @@ pub struct NewtonSettings {
     pub symmetric: bool,
 }
 
-/// What a step's equations consist of beside the stress of its points.
-pub struct StepEquations<'a, const D: usize> {
+/// What a step's equations of `N` unknowns per node consist of beside the stress of its points.
+pub struct StepEquations<'a, const N: usize> {
     /// What boundaries prescribe.
     pub conditions: &'a Conditions,
     /// Local nodes that carry no equation of their own (`drop_below`).
@@ -53,12 +53,13 @@ pub struct StepEquations<'a, const D: usize> {
     /// Right-hand side of the owned degrees of freedom, N.
     pub external_owned: Vec<f64>,
     /// Those that follow stress and Ghost stiffness, in their order.
-    pub terms: Vec<Box<dyn Term<D> + 'a>>,
+    pub terms: Vec<Box<dyn Term<N> + 'a>>,
 }
 
-/// One step's equations. Vectors named `*_owned` hold the owned degrees of freedom, the others
-/// the local ones (owned, then ghosts).
-pub struct Equilibrium<'a, const D: usize> {
+/// One step's equations: `N` unknowns at each node of a grid in `D` dimensions, displacements unless
+/// its terms say otherwise. Vectors named `*_owned` hold the owned degrees of freedom, the others the
+/// local ones (owned, then ghosts).
+pub struct Equilibrium<'a, const D: usize, const N: usize = D> {
     world: &'a World,
     grid: &'a Grid<D>,
     numbering: &'a Numbering,
@@ -70,10 +71,10 @@ pub struct Equilibrium<'a, const D: usize> {
     /// All external forces of the last evaluation.
     external_owned: Vec<f64>,
     external_previous: Vec<f64>,
-    following: Option<Followed<'a, D>>,
+    following: Option<Followed<'a, N>>,
     /// What is summed, in this order.
-    terms: Vec<Box<dyn Term<D> + 'a>>,
-    addresses: RowAddresses<D>,
+    terms: Vec<Box<dyn Term<N> + 'a>>,
+    addresses: RowAddresses<N>,
     /// Rows that the solver's array cannot take whole.
     beside: Vec<f64>,
     /// What the matrix holds.
@@ -104,8 +105,8 @@ pub struct Equilibrium<'a, const D: usize> {
 }
 
 /// External forces that follow the motion.
-struct Followed<'a, const D: usize> {
-    loads: Following<'a, D>,
+struct Followed<'a, const N: usize> {
+    loads: Box<dyn Follow<N> + 'a>,
     /// Share of the forces of a step's end in its equations: 1 + alpha of the HHT method.
     share: f64,
     /// What acts besides, owned.
@@ -114,7 +115,7 @@ struct Followed<'a, const D: usize> {
     force: Vec<f64>,
 }
 
-impl<const D: usize> Followed<'_, D> {
+impl<const N: usize> Followed<'_, N> {
     /// external = dead + share force, from this rank's shares of `force` at its local nodes.
     /// Collective.
     fn join(
@@ -124,8 +125,8 @@ impl<const D: usize> Followed<'_, D> {
         mut force: Vec<f64>,
         external: &mut [f64],
     ) -> Result<()> {
-        numbering.halo.reverse_add(world, &mut force, D)?;
-        force.truncate(numbering.owned * D);
+        numbering.halo.reverse_add(world, &mut force, N)?;
+        force.truncate(numbering.owned * N);
         for ((total, dead), f) in external.iter_mut().zip(&self.dead).zip(&force) {
             *total = dead + self.share * f;
         }
@@ -146,27 +147,15 @@ enum Tangent {
 }
 
 impl<'a, const D: usize> Equilibrium<'a, D> {
-    /// The equations of one step, before any iterate.
+    /// The equations of one step for the displacements, before any iterate.
     pub fn new(
         world: &'a World,
         grid: &'a Grid<D>,
         mesh: &'a Discretisation<D>,
         step: StepPoints<'a, D>,
-        equations: StepEquations<'a, D>,
+        mut equations: StepEquations<'a, D>,
         settings: NewtonSettings,
     ) -> Result<Self> {
-        let StepEquations { conditions, left_out, external_owned, terms: further } = equations;
-        let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
-        let mut held = conditions.fixed.clone();
-        let increment = conditions.increment.clone();
-        for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {
-            // A prescribed motion stays: the gradient may see a node whose weight vanishes.
-            held[local * D..(local + 1) * D].fill(true);
-        }
-        let owned = numbering.owned * D;
-        let addresses = RowAddresses::<D>::new(numbering, pattern);
-        let held =
-            Held::new::<D>(numbering, pattern, held, &conditions.fixed, |row| addresses.start(row));
         // The terms of a step: a new one is a line here.
         let (frame, symmetric) = (settings.frame, settings.symmetric);
         let mut terms: Vec<Box<dyn Term<D> + 'a>> =
@@ -174,9 +163,44 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         if let Some(ghost) = Ghost::new(world, mesh)? {
             terms.push(Box::new(ghost));
         }
-        terms.extend(further);
+        terms.append(&mut equations.terms);
+        equations.terms = terms;
+        Ok(Self::of_terms(world, grid, mesh, equations, settings))
+    }
+
+    /// The same equations with external forces that follow the motion; `share`: 1 + alpha of the HHT
+    /// method, else 1.
+    pub fn with_following(mut self, loads: Option<Following<'a, D>>, share: f64) -> Self {
+        let (dead, force) = (self.external_owned.clone(), Vec::new());
+        self.following = loads.map(|loads| Followed { loads: Box::new(loads), share, dead, force });
+        self
+    }
+}
+
+impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
+    /// The equations that the terms make and no others, before any iterate. Multigrid serves
+    /// displacements alone: with other unknowns the solver is any of PETSc's.
+    pub fn of_terms(
+        world: &'a World,
+        grid: &'a Grid<D>,
+        mesh: &'a Discretisation<D>,
+        equations: StepEquations<'a, N>,
+        settings: NewtonSettings,
+    ) -> Self {
+        let StepEquations { conditions, left_out, external_owned, terms } = equations;
+        let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+        let mut held = conditions.fixed.clone();
+        let increment = conditions.increment.clone();
+        for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {
+            // A prescribed motion stays: the gradient may see a node whose weight vanishes.
+            held[local * N..(local + 1) * N].fill(true);
+        }
+        let owned = numbering.owned * N;
+        let addresses = RowAddresses::<N>::new(numbering, pattern);
+        let held =
+            Held::new::<N>(numbering, pattern, held, &conditions.fixed, |row| addresses.start(row));
         let beside = vec![0.0; addresses.len_beside()];
-        Ok(Equilibrium {
+        Equilibrium {
             world,
             grid,
             numbering,
@@ -192,7 +216,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             beside,
             tangent: Tangent::Stale,
             levels: Levels::default(),
-            displacement: vec![0.0; numbering.len() * D],
+            displacement: vec![0.0; numbering.len() * N],
             previous_owned: vec![0.0; owned],
             internal_owned: vec![0.0; owned],
             internal_previous: vec![0.0; owned],
@@ -206,15 +230,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
             actions_norm: 0.0,
             at_round_off: false,
             health: Health::default(),
-        })
-    }
-
-    /// The same equations with external forces that follow the motion; `share`: 1 + alpha of the HHT
-    /// method, else 1.
-    pub fn with_following(mut self, loads: Option<Following<'a, D>>, share: f64) -> Self {
-        let (dead, force) = (self.external_owned.clone(), Vec::new());
-        self.following = loads.map(|loads| Followed { loads, share, dead, force });
-        self
+        }
     }
 
     /// Forces of the last evaluation that follow the motion, N, owned nodes; empty without any.
@@ -288,14 +304,14 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
 
     fn load_displacement(&mut self, x: &[f64]) -> Result<()> {
         self.displacement[..x.len()].copy_from_slice(x);
-        self.numbering.halo.forward(self.world, &mut self.displacement, D)
+        self.numbering.halo.forward(self.world, &mut self.displacement, N)
     }
 
     /// Evaluates the force at the loaded displacement, and the tangent where `matrix` is given;
     /// false if it must be refused.
     fn evaluate(&mut self, matrix: Option<&mut Matrix>) -> Result<bool> {
         let numbering = self.numbering;
-        let mut force = vec![0.0; numbering.len() * D];
+        let mut force = vec![0.0; numbering.len() * N];
         let mut storage = matrix.map(Matrix::storage).transpose()?;
         let base = self.terms.iter().find_map(|term| term.first_in_rows());
         let mut rows = match &mut storage {
@@ -306,8 +322,8 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         let (world, pattern, terms) = (self.world, self.pattern, &self.terms);
         let at = At { pattern, displacement: &self.displacement };
         let following = self.following.as_ref();
-        let mut pushed = vec![0.0; following.map_or(0, |_| numbering.len() * D)];
-        let mut add = |part: Part, force: &mut [f64], mut rows: Option<&mut InPlace<'_, D>>| {
+        let mut pushed = vec![0.0; following.map_or(0, |_| numbering.len() * N)];
+        let mut add = |part: Part, force: &mut [f64], mut rows: Option<&mut InPlace<'_, N>>| {
             let health = terms.iter().fold(Health::default(), |health, term| {
                 health.and(term.add_shares(part, at, force, rows.as_deref_mut()))
             });
@@ -321,7 +337,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         if let Some(rows) = &mut rows {
             rows.finish(pattern, numbering.owned);
         }
-        let inner = numbering.halo.reverse_add_while(world, [&mut force[..]], D, |[force]| {
+        let inner = numbering.halo.reverse_add_while(world, [&mut force[..]], N, |[force]| {
             let Some(rows) = &mut rows else { return add(Part::Inner, force, None) };
             scatter::reduce_while(world, pattern, rows, |rows| {
                 let health = add(Part::Inner, force, Some(&mut *rows));
@@ -336,7 +352,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
         if world.any(refuse) {
             return Ok(false);
         }
-        force.truncate(numbering.owned * D);
+        force.truncate(numbering.owned * N);
         for term in terms {
             term.add_force(at, &mut force);
         }
@@ -393,7 +409,7 @@ impl<'a, const D: usize> Equilibrium<'a, D> {
 
 /// Mean and largest size of the free diagonal entries over all ranks; 1 where there are none.
 /// Collective.
-fn free_diagonal<const D: usize, R: BlockRows<D>>(
+fn free_diagonal<const N: usize, R: BlockRows<N>>(
     world: &World,
     owned: usize,
     pattern: &Pattern,
@@ -404,9 +420,9 @@ fn free_diagonal<const D: usize, R: BlockRows<D>>(
     for row in 0..owned {
         let range = pattern.offsets[row]..pattern.offsets[row + 1];
         let Some(position) = pattern.diagonal(row) else { continue };
-        let start = rows.start(pattern, row) + (position - range.start) * D;
-        for i in (0..D).filter(|i| free(row * D + i)) {
-            let entry = rows.values(start + i * (range.len() * D + 1), 1)[0].abs();
+        let start = rows.start(pattern, row) + (position - range.start) * N;
+        for i in (0..N).filter(|i| free(row * N + i)) {
+            let entry = rows.values(start + i * (range.len() * N + 1), 1)[0].abs();
             sum += entry;
             largest = largest.max(entry);
             count += 1;

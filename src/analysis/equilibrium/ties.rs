@@ -10,9 +10,9 @@ use super::Equilibrium;
 /// Share of a node's own stiffness, all components, from which on a penalty ties it.
 const TIED: f64 = 0.1;
 
-impl<const D: usize> Equilibrium<'_, D> {
+impl<const D: usize, const N: usize> Equilibrium<'_, D, N> {
     /// Of the last evaluation, whose tangent the matrix's `rows` hold. Collective.
-    pub(super) fn ties(&self, rows: &Assembled) -> Result<Ties<D>> {
+    pub(super) fn ties(&self, rows: &Assembled) -> Result<Ties<N>> {
         let (world, of) = (self.world, self.numbering);
         let mut stiffness = vec![0.0; of.len()];
         self.terms.iter().for_each(|term| term.add_penalties(self.at(), &mut stiffness));
@@ -26,9 +26,9 @@ impl<const D: usize> Equilibrium<'_, D> {
         of.halo.reverse_add(world, &mut stiffness, 1)?;
         ties.nodes = vec![false; of.owned];
         for (row, tied) in ties.nodes.iter_mut().enumerate() {
-            Rows::<D>::visit(rows, row, |column, block| {
+            Rows::<N>::visit(rows, row, |column, block| {
                 if column == row {
-                    let all: f64 = (0..D).map(|i| block[i][i]).sum();
+                    let all: f64 = (0..N).map(|i| block[i][i]).sum();
                     *tied = stiffness[row] > TIED * all;
                 }
             });
@@ -39,7 +39,7 @@ impl<const D: usize> Equilibrium<'_, D> {
         self.terms.iter().for_each(|term| term.correct_surrogate(self.at(), &mut ties.corrections));
         // Held rows and columns are those of the identity.
         for (a, b, block) in &mut ties.corrections {
-            let held = |node: u32, i: usize| self.held.holds(node as usize * D + i);
+            let held = |node: u32, i: usize| self.held.holds(node as usize * N + i);
             for (i, line) in block.iter_mut().enumerate() {
                 for (j, value) in line.iter_mut().enumerate() {
                     if held(*a, i) || held(*b, j) {

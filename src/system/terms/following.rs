@@ -5,15 +5,32 @@ use crate::deck::When;
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
+use crate::system::in_place::InPlace;
 use crate::system::model::Model;
 use crate::system::pattern::Pattern;
-use crate::system::scatter::BlockRows;
+
 use crate::system::step_system::Discretisation;
 
 use super::pressure::PressureTerm;
 use super::stress::StepPoints;
 use super::surface::SurfaceTerm;
 use super::term::{At, Part};
+
+/// Forces that follow an iterate of `N` unknowns per node. No call is made per point.
+pub trait Follow<const N: usize> {
+    /// Adds this rank's shares of the force at an iterate, N, and the tangent of its negative where
+    /// there are `rows`.
+    fn add_shares(
+        &self,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        rows: Option<&mut InPlace<'_, N>>,
+    );
+
+    /// Adds the stiffness by which supports hold local nodes, this rank's share, N/m.
+    fn add_penalties(&self, stiffness: &mut [f64]);
+}
 
 /// What a deck has of these forces, at one moment of a step.
 pub struct Following<'a, const D: usize> {
@@ -37,30 +54,6 @@ impl<'a, const D: usize> Following<'a, D> {
         any.then_some(Following { step, pressure, surface })
     }
 
-    /// Adds this rank's shares of the force at an iterate, N, and the tangent of its negative where
-    /// there are `rows`.
-    pub fn add_shares<R: BlockRows<D>>(
-        &self,
-        part: Part,
-        at: At<'_>,
-        force: &mut [f64],
-        mut rows: Option<&mut R>,
-    ) {
-        if let Some(pressure) = &self.pressure {
-            pressure.add_shares(self.step, part, at, force, rows.as_deref_mut());
-        }
-        if let Some(surface) = &self.surface {
-            surface.add_shares(self.step, part, at, force, rows);
-        }
-    }
-
-    /// Adds the stiffness by which supports hold local nodes, this rank's share, N/m.
-    pub fn add_penalties(&self, stiffness: &mut [f64]) {
-        if let Some(surface) = &self.surface {
-            surface.add_penalties(self.step, stiffness);
-        }
-    }
-
     /// This rank's share of the force at `nodes` local nodes at the step's start, N.
     pub fn at_start(&self, pattern: &Pattern, nodes: usize) -> Vec<f64> {
         let mut force = match &self.pressure {
@@ -81,5 +74,28 @@ impl<'a, const D: usize> Following<'a, D> {
         numbering.halo.reverse_add(world, &mut force, D)?;
         force.truncate(numbering.owned * D);
         Ok(force)
+    }
+}
+
+impl<const D: usize> Follow<D> for Following<'_, D> {
+    fn add_shares(
+        &self,
+        part: Part,
+        at: At<'_>,
+        force: &mut [f64],
+        mut rows: Option<&mut InPlace<'_, D>>,
+    ) {
+        if let Some(pressure) = &self.pressure {
+            pressure.add_shares(self.step, part, at, force, rows.as_deref_mut());
+        }
+        if let Some(surface) = &self.surface {
+            surface.add_shares(self.step, part, at, force, rows);
+        }
+    }
+
+    fn add_penalties(&self, stiffness: &mut [f64]) {
+        if let Some(surface) = &self.surface {
+            surface.add_penalties(self.step, stiffness);
+        }
     }
 }

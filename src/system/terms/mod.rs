@@ -16,7 +16,7 @@
 //! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
 //! | products of the last two | `scalar.rs` | |
 
-mod block;
+pub mod block;
 pub mod contact;
 pub mod facing;
 pub(crate) mod following;
