@@ -274,14 +274,16 @@ fn a_browser_shows_the_points_and_its_controls_change_them() {
         said(JSON.stringify({ seen, moved, stepped, drawn: canvas.dataset.drawn, field: canvas.dataset.field,
             label: canvas.getAttribute('aria-label'), plots: document.querySelectorAll('#curves .uplot').length,
             outcome: document.getElementById('outcome').textContent,
+            facts: document.getElementById('facts').textContent,
             reachable: [...document.querySelectorAll('select, input, button, #canvas')].every((n) => n.tabIndex === 0) }));
     ";
-    for (run, points, steps) in [
-        (beam(), "360", ["1", "2"]),
+    for (run, points, steps, units) in [
+        (beam(), "360", ["1", "2"], ["kg/m,", "m2"]),
         (
             Run::text(CUBE).set("output.fields=[\"stress\"]").set("output.every=1").set("petsc="),
             "",
             ["1", "2"],
+            ["kg,", "m3"],
         ),
     ] {
         let results = run.results();
@@ -300,6 +302,8 @@ fn a_browser_shows_the_points_and_its_controls_change_them() {
         assert_eq!(found["reachable"], true);
         assert!(found["plots"].as_u64().unwrap() >= 3, "{said}");
         assert!(found["outcome"].as_str().unwrap().starts_with("completed"), "{said}");
+        let facts = found["facts"].as_str().unwrap();
+        assert!(units.iter().all(|unit| facts.contains(&format!(" {unit}"))), "{facts}");
         assert!(points.is_empty() || found["drawn"] == points, "{said}");
     }
 }

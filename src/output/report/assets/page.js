@@ -38,11 +38,14 @@
       facts.push(["Newton iterations", `${summary.newton_iterations.total}, at most ${summary.newton_iterations.max} in a step`]);
     if (summary.linear_iterations.total)
       facts.push(["linear iterations", `${summary.linear_iterations.total}, at most ${summary.linear_iterations.max} in a step`]);
+    // In plane strain the run counts per metre of thickness, as its table says.
+    const plane = (data.tables.history?.header || []).some((name) => name.endsWith("[J/m]"));
+    const [mass, volume] = plane ? ["kg/m", "m2"] : ["kg", "m3"];
     for (const [name, body] of Object.entries(summary.bodies || {})) {
       // Round-off beside the body's size is nothing.
       const size = Math.max(...body.extent_max.map((x, k) => x - body.extent_min[k]));
       const place = (x) => figure(Math.abs(x) < 1e-6 * size ? 0 : x);
-      facts.push([`body ${name}`, `from (${body.extent_min.map(place).join(", ")}) to (${body.extent_max.map(place).join(", ")}) m, mass ${figure(body.mass)}, volume ${figure(body.volume)}`]);
+      facts.push([`body ${name}`, `from (${body.extent_min.map(place).join(", ")}) to (${body.extent_max.map(place).join(", ")}) m, mass ${figure(body.mass)} ${mass}, volume ${figure(body.volume)} ${volume}`]);
     }
     for (const [name, value] of Object.entries(summary.verify || {})) facts.push([`verify ${name}`, figure(value)]);
     facts.push(["versions", Object.entries(summary.versions).map(([n, v]) => `${n} ${v}`).join(", ")]);
