@@ -128,7 +128,8 @@ impl<const D: usize> System<D> {
     ) -> Result<Self> {
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let step = mesh.step_points(points, &model.materials);
-        let mass = matrix::consistent(world, step, pattern)?;
+        let mass =
+            matrix::consistent(world, step, pattern, (&mesh.numbering.halo, mesh.numbering.len()))?;
         let mut mass_ghost = mass.clone();
         if let Some(share) = ghost_matrix(world, mesh, |face| face.mass)? {
             add(&mut mass_ghost.values, &share.values);

@@ -197,6 +197,10 @@ impl Shape {
 /// Of the options of the equilibrium solver.
 const PREFIX: &str = "qs_";
 
+/// Preconditioners that need an iteration around them, at any size.
+const APPROXIMATE: [&str; 11] =
+    ["mg", "gamg", "hypre", "jacobi", "pbjacobi", "bjacobi", "asm", "ilu", "icc", "sor", "none"];
+
 /// Newton's method with a built-in linear solver. `null_pivots`: the system may be singular and
 /// consistent, and a direct solver has to look for zero pivots.
 pub fn newton(
@@ -227,6 +231,12 @@ fn newton_under(
     if !factors(prefix)? {
         // MUMPS has no others than those of LU and Cholesky.
         defaults.retain(|(name, _)| *name != "pc_factor_mat_solver_type");
+    } else if matches!(linear, Linear::Multigrid | Linear::Trial) && chosen(prefix)?.is_some() {
+        // Factors of an earlier matrix would make Newton's method a slow one.
+        set(&mut defaults, "snes_lag_preconditioner", "1");
+    }
+    if chosen(prefix)?.is_some_and(|chosen| APPROXIMATE.contains(&chosen.as_str())) {
+        set(&mut defaults, "ksp_type", if shape.symmetric { "cg" } else { "fgmres" });
     }
     snes.set_defaults(&defaults)?;
     if null_pivots && matches!(linear, Linear::Direct | Linear::DirectOnOne) {
@@ -243,9 +253,20 @@ fn newton_under(
 
 /// Whether the preconditioner is, for all the user says, a complete factorisation.
 fn factors(prefix: &str) -> Result<bool> {
+    Ok(chosen(prefix)?.is_none_or(|chosen| ["lu", "cholesky"].contains(&chosen.as_str())))
+}
+
+/// The preconditioner that the user asks for.
+fn chosen(prefix: &str) -> Result<Option<String>> {
     let name = format!("{prefix}pc_type");
-    let chosen = if options::is_users(&name)? { options::get(&name)? } else { None };
-    Ok(chosen.is_none_or(|chosen| ["lu", "cholesky"].contains(&chosen.as_str())))
+    if options::is_users(&name)? { options::get(&name) } else { Ok(None) }
+}
+
+/// Another value for one of the defaults.
+fn set(defaults: &mut [(&str, String)], name: &str, value: &str) {
+    for (_, default) in defaults.iter_mut().filter(|(known, _)| *known == name) {
+        *default = value.into();
+    }
 }
 
 /// Tries the user's options on a small system, before anything is written. `equations`: of the

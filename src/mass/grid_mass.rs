@@ -43,7 +43,8 @@ impl GridMass {
                 Ok(GridMass::Lumped(mass.into_flattened()))
             }
             Mass::Consistent => {
-                let mut matrix = matrix::consistent(world, step, &mesh.pattern)?;
+                let local = (&mesh.numbering.halo, mesh.numbering.len());
+                let mut matrix = matrix::consistent(world, step, &mesh.pattern, local)?;
                 let ghost = ghost_matrix(world, mesh, |face| face.mass)?;
                 if let Some(ghost) = &ghost {
                     for (value, share) in matrix.values.iter_mut().zip(&ghost.values) {

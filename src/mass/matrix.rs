@@ -2,12 +2,17 @@
 //!
 //! All are scalar, the same for each component: M ⊗ 1. The entries of M_G sum to zero, so the
 //! stabilised matrix has the mass and the momentum of the plain one.
+//!
+//! A grain that flies alone, a point none of whose nodes another point reaches, gives a matrix of rank one to all its
+//! nodes. Ghost does not help, for it takes no motion that is linear over the cells as wrong. Such a
+//! point has its row sums on the diagonal in place of it: its nodes move as it does.
 
 use std::ops::Range;
 
 use crate::error::Result;
 use crate::parallel::World;
 
+use crate::parallel::HaloPlan;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{BlockMatrix, add_support};
 use crate::system::terms::stress::StepPoints;
@@ -29,12 +34,43 @@ pub fn add_lumped<const D: usize>(step: StepPoints<'_, D>, part: Range<usize>, m
     }
 }
 
-/// The consistent matrix in its owners' rows, one dense block per group of points. Collective.
+/// Groups of one point whose nodes no other group reaches, in order; `nodes`: local ones, with their `halo`.
+/// Collective.
+fn alone<const D: usize>(
+    world: &World,
+    step: StepPoints<'_, D>,
+    halo: &HaloPlan,
+    nodes: usize,
+) -> Result<Vec<usize>> {
+    let groups = step.groups.len();
+    let single = |group: &usize| step.groups.points(*group).len() == 1;
+    if !world.any((0..groups).any(|group| single(&group))) {
+        return Ok(Vec::new());
+    }
+    let mut reached = vec![0.0; nodes];
+    for group in 0..groups {
+        for &node in step.nodes_of_group(group) {
+            reached[node as usize] += 1.0;
+        }
+    }
+    halo.reverse_add(world, &mut reached, 1)?;
+    halo.forward(world, &mut reached, 1)?;
+    let free = |group: &usize| {
+        step.nodes_of_group(*group).iter().all(|&node| reached[node as usize] == 1.0)
+    };
+    Ok((0..groups).filter(|group| single(group) && free(group)).collect())
+}
+
+/// The consistent matrix in its owners' rows, one dense block per group of points. `nodes`: local ones, with
+/// their `halo`. Collective.
 pub fn consistent<const D: usize>(
     world: &World,
     step: StepPoints<'_, D>,
     pattern: &Pattern,
+    (halo, nodes): (&HaloPlan, usize),
 ) -> Result<BlockMatrix<1>> {
+    let alone = alone(world, step, halo, nodes)?;
+    let mut alone = alone.iter().peekable();
     let mut matrix = BlockMatrix::zeros(pattern);
     let mut block = Vec::new();
     for group in 0..step.groups.len() {
@@ -42,6 +78,15 @@ pub fn consistent<const D: usize>(
         let count = nodes.len();
         block.clear();
         block.resize(count * count, 0.0);
+        if alone.next_if_eq(&&group).is_some() {
+            let p = step.groups.points(group)[0];
+            let weights = &step.influences.weights[step.influences.row(p)];
+            for (entry, weight) in block.iter_mut().step_by(count + 1).zip(weights) {
+                *entry = step.points.mass[p] * weight;
+            }
+            add_support(&mut matrix, pattern, group, &block);
+            continue;
+        }
         for &p in step.groups.points(group) {
             let weights = &step.influences.weights[step.influences.row(p)];
             for (row, weight) in block.chunks_exact_mut(count).zip(weights) {
