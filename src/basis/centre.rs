@@ -37,7 +37,8 @@ pub struct RowNodes<'a> {
 }
 
 impl RowNodes<'_> {
-    fn of(&self, p: usize) -> &[u32] {
+    /// Local nodes of point `p`'s row
+    pub(super) fn of(&self, p: usize) -> &[u32] {
         let (group, offsets) = (self.groups.group_of_point[p], &self.groups.node_offsets);
         &self.nodes[offsets[group]..offsets[group + 1]]
     }
@@ -202,7 +203,7 @@ fn place_in_row<const D: usize>(counts: &[usize; D], index: [usize; D]) -> usize
 
 /// Σ V Π_a N_a over the `axes` (bits), N_a = ξ_a at the upper end of axis a and 1 - ξ_a at the lower one, the
 /// ends those of `corner`.
-fn product_mean(moments: &[f64], corner: usize, axes: usize) -> f64 {
+pub(super) fn product_mean(moments: &[f64], corner: usize, axes: usize) -> f64 {
     let (upper, lower) = (corner & axes, !corner & axes);
     // Π (1 - ξ) over the lower ends is the alternating sum over their subsets.
     let (mut sum, mut subset) = (0.0, lower);

@@ -118,7 +118,7 @@ pub trait Basis<const D: usize> {
     ) -> Result<()> {
         let _ = (grid, points, influences, rows, sums);
         Err(Error::Input(
-            "method.locking = \"f-bar\" is for basis = \"mpm\" and basis = \"gimp\"".to_string(),
+            "method.locking = \"f-bar\": this basis gives no gradients of cells".to_string(),
         ))
     }
 

@@ -14,10 +14,11 @@ use crate::grid::lattice::CORNER_SIGNS;
 use crate::points::Points;
 use crate::tensor::dense;
 
+use super::centre::{Moments, RowNodes};
 use super::contract::Basis;
 use super::corner::{self, Corners, for_each_place};
 use super::domain::{self, DomainStep};
-use super::{Influences, row};
+use super::{Influences, box_means, row};
 
 /// Parallelograms or parallelepipeds that follow F.
 pub struct Cpdi1;
@@ -68,6 +69,27 @@ impl<const D: usize> Basis<D> for Cpdi1 {
     ) -> Result<usize> {
         domain::update_extents(points, corner_positions);
         Ok(0)
+    }
+
+    fn cell_moments(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &Influences<D>,
+        rows: RowNodes<'_>,
+    ) -> Result<Vec<Moments>> {
+        box_means::moments(grid, points, influences, rows, |p| corners(points, p))
+    }
+
+    fn fill_cell_rows(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        rows: RowNodes<'_>,
+        sums: &[Moments],
+    ) -> Result<()> {
+        box_means::fill(grid, points, influences, rows, sums, |p| corners(points, p))
     }
 }
 

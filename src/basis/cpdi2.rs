@@ -19,10 +19,11 @@ use crate::grid::element::{determinant, inverse, jacobian};
 use crate::grid::quadrature::gauss_rule;
 use crate::points::Points;
 
+use super::centre::{Moments, RowNodes};
 use super::contract::Basis;
 use super::corner::{self, Corners, for_each_place};
 use super::domain::{self, DomainStep};
-use super::{Influences, row};
+use super::{Influences, box_means, row};
 
 /// Quadrilaterals or hexahedra whose corners follow the nodes.
 pub struct Cpdi2;
@@ -70,6 +71,27 @@ impl<const D: usize> Basis<D> for Cpdi2 {
     ) -> Result<usize> {
         domain::update_extents(points, |points, p| points.corners[p]);
         Ok(0)
+    }
+
+    fn cell_moments(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &Influences<D>,
+        rows: RowNodes<'_>,
+    ) -> Result<Vec<Moments>> {
+        box_means::moments(grid, points, influences, rows, |p| corners(points, p))
+    }
+
+    fn fill_cell_rows(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        rows: RowNodes<'_>,
+        sums: &[Moments],
+    ) -> Result<()> {
+        box_means::fill(grid, points, influences, rows, sums, |p| corners(points, p))
     }
 }
 

@@ -10,11 +10,12 @@
 //! | `gimp` | `hats.rs` | cells that a domain overlaps, and means of hats over it |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
-//! | `locking` | `centre.rs` | gradients of cells, for F-bar |
+//! | `locking` | `centre.rs`; `box_means.rs` for `cpdi1` and `cpdi2` | gradients of cells, for F-bar |
 //! | `symmetry` | `radial.rs` | rings: S, its gradient and S/r, weighted by the radius |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
 
+mod box_means;
 pub(crate) mod centre;
 pub mod contract;
 pub(crate) mod domain;

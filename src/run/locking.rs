@@ -60,7 +60,7 @@ pub fn warning<const D: usize>(
     (!reasons.is_empty()).then(|| {
         format!(
             "{} can make points lock: too stiff, and pressures that jump from point to point; \
-             [method] locking = \"f-bar\" (basis mpm or gimp) avoids it",
+             [method] locking = \"f-bar\" avoids it",
             reasons.join(" and ")
         )
     })

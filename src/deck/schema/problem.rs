@@ -168,7 +168,7 @@ pub const SECTIONS: &[Section] = &[
                 "What stresses are integrated over: det F V0, or the volume of the GIMP domain (domain: quasi-static; Lagrangian §7 with normal, stretch or none).")
                 .read_by(&[GIMP, QUASI_STATIC]),
             key("locking", Choice(Locking::NAMES), Default("\"none\""),
-                "f-bar: stresses from dF with the change of volume of the cells that a point touches (the mean over the material in each of them), for Poisson's ratios near 0.5 and plastic flow without change of volume (bases mpm and gimp). The force is the derivative of the energy: nothing is gained or lost, and the tangent is symmetric where the materials' are. Triangles and tetrahedra gain nothing.")
+                "f-bar: stresses from dF with the change of volume of the cells that a point touches (the mean over the material in each of them), for Poisson's ratios near 0.5 and plastic flow without change of volume (mpm; gimp, cpdi1 and cpdi2 on a lattice). The force is the derivative of the energy: nothing is gained or lost, and the tangent is symmetric where the materials' are. Triangles and tetrahedra gain nothing.")
                 .read_by(&[LOADED]),
             key("frame", Choice(Frame::NAMES), Default("\"previous\""),
                 "State in which equilibrium is written (Lagrangian §3-5).")

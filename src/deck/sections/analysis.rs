@@ -1,8 +1,7 @@
 //! `[analysis]`, `[method]`, `[conditioning]`.
 
 use crate::deck::model::{
-    AffineTransfer, Analysis, AnalysisType, Basis, Damping, GimpEdge, Locking, Mass, Method,
-    StressUpdate,
+    AffineTransfer, Analysis, AnalysisType, Basis, Damping, GimpEdge, Mass, Method, StressUpdate,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -181,16 +180,6 @@ pub fn method(
     let (gimp_edge, stress_update) = (gimp_edge?, stress_update?);
     if let Some(affine) = affine {
         allows_affine(table, affine, basis, gimp_edge, stress_update)?;
-    }
-    if locking == Locking::FBar && !matches!(basis, Basis::Mpm | Basis::Gimp) {
-        return Err(table.problem(
-            "locking",
-            format!(
-                "\"f-bar\" is for basis = \"mpm\" and basis = \"gimp\", found \"{}\": take one of them, \
-                 or locking = \"none\"",
-                basis.name()
-            ),
-        ));
     }
     // Explicit steps keep every node that has mass: dropping one would lose its momentum.
     let keeps_all = stiffened || kind == Some(AnalysisType::Explicit);

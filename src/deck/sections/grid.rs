@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::deck::model::{
-    Basis, BodySource, Boundary, Deck, Element, Grid, LatticeGrid, MeshGrid, MeshMotion,
+    Basis, BodySource, Boundary, Deck, Element, Grid, LatticeGrid, Locking, MeshGrid, MeshMotion,
     MeshSource, Method, Place, Seeding,
     stations::{self, Station},
 };
@@ -252,6 +252,18 @@ pub fn check_basis(table: &Table<'_>, grid: &Grid, method: &Method) -> Got<()> {
                 }
                 None => "on a mesh use basis = \"mpm\", \"cpdi1\" or \"cpdi2\"",
             },
+        ));
+    }
+    let corners = matches!(method.basis, Basis::Cpdi1 | Basis::Cpdi2);
+    if matches!(grid, Grid::Mesh(_)) && corners && method.locking == Locking::FBar {
+        return Err(table.problem_with_help(
+            "type",
+            format!(
+                "method.locking = \"f-bar\" with basis = \"{}\" needs type = \"lattice\": its means over \
+                 cells are those of boxes",
+                method.basis.name()
+            ),
+            "on a mesh use basis = \"mpm\", or locking = \"none\"",
         ));
     }
     Ok(())
