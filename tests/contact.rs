@@ -364,6 +364,64 @@ fields = ["stress"]
     assert!((base + force).abs() < 1e-8 * force, "{base} {force}");
 }
 
+/// A rigid ball on an elastic half space, in axisymmetry (formulations.md C.5, at strains of 3 %, for which
+/// Hertz's forms hold): a^3 = 3 F R / (4 E*), p_max = 3 F / (2 pi a^2), approach a^2 / R less the
+/// F / (pi E* H) that a block of depth H lacks of a half space.
+#[test]
+fn a_ball_presses_as_hertz_says() {
+    let text = r#"
+[analysis]
+type = "quasi-static"
+symmetry = "axisymmetric"
+steps = 3
+max_iterations = 25
+[method]
+basis = "gimp"
+domain_update = "stretch"
+[grid]
+type = "lattice"
+origin = [0.0, -1.92]
+size = [1.92, 2.04]
+h = 0.024
+[material.rubber]
+model = "hencky"
+young = 1e6
+poisson = 0.3
+[[body]]
+name = "ground"
+material = "rubber"
+shape = { box = { min = [0.0, -1.92], max = [1.92, 0.0] } }
+[[boundary]]
+name = "base"
+where = { side = "bottom" }
+fix = ["x", "y"]
+[[rigid]]
+name = "ball"
+shape = { disc = { centre = [0, 4], radius = 4.0 } }
+motion = { displacement = [0.0, -0.009] }
+[[contact]]
+between = ["ball", "ground"]
+[output]
+fields = ["stress"]
+"#;
+    let results = Run::text(text).results();
+    let (pi, modulus) = (std::f64::consts::PI, 1e6 / (1.0 - 0.3 * 0.3));
+    let force = -last(&results, "reaction.ball.y");
+    let radius = (0.75 * force * 4.0 / modulus).cbrt();
+    let touching = (last(&results, "contact.ball-ground.area") / pi).sqrt();
+    assert!((touching / radius - 1.0).abs() < 0.03, "radius {touching}, Hertz {radius}");
+    let peak = 1.5 * force / (pi * radius * radius);
+    let points = results.points(3);
+    let (position, stress) = (points.field("position"), points.component("stress", 3));
+    let near = position.chunks_exact(3).zip(stress).filter(|(x, _)| x[0] < 0.01);
+    let found = -near.max_by(|(x, _), (y, _)| x[1].total_cmp(&y[1])).expect("a point").1;
+    assert!((found / peak - 1.0).abs() < 0.03, "p_max {found}, Hertz {peak}");
+    let approach = radius * radius / 4.0 - force / (pi * modulus * 1.92);
+    assert!((0.009 / approach - 1.0).abs() < 0.03, "approach {approach}");
+    let base = last(&results, "reaction.base.y");
+    assert!((base / force - 1.0).abs() < 1e-8, "{base} {force}");
+}
+
 #[test]
 fn faults_of_contacts_are_told_with_their_cure() {
     let said = |from: &str, to: &str| {

@@ -681,6 +681,52 @@ fn files_that_bound_no_body_are_refused() {
     assert!(outcome.code == 2 && outcome.said().contains("cannot be read"), "{}", outcome.said());
 }
 
+/// A rigid body takes no file that bounds none, and no load acts on a body that has gone.
+#[test]
+fn what_contacts_and_loads_cannot_act_on_is_refused() {
+    let rigid = SOLID
+        .replace("shape = { stl = \"ball.stl\" }", "shape = { box = { min = [0, 0, 0], max = [1, 1, 1] } }")
+        .replace("[[load]]\npressure = { value = 1e5, surface = {} }", "[[rigid]]\nname = \"tool\"\nshape = { stl = \"tool.stl\" }\n[[contact]]\nbetween = [\"tool\", \"ball\"]");
+    let good: Vec<[[f64; 3]; 3]> =
+        ball(0.3, 1).iter().map(|t| t.map(|[x, y, z]| [x + 0.5, y + 0.5, z + 1.31])).collect();
+    let mut turned = good.clone();
+    turned[4].swap(0, 1);
+    let inward: Vec<_> = good.iter().map(|[a, b, c]| [*b, *a, *c]).collect();
+    let mut twice = good.clone();
+    twice.extend(good.iter().map(|t| t.map(|x| [x[0] + 0.1, x[1] + 0.02, x[2] + 0.03])));
+    let deeper: Vec<_> = good.iter().map(|t| t.map(|[x, y, z]| [x, y, z - 0.11])).collect();
+    for (triangles, words) in [
+        (&good[1..], &["is open: 3 edges", "tool.stl"][..]),
+        (&turned, &["face to different sides", "tool.stl"]),
+        (&inward, &["face inward", "tool.stl"]),
+        (&twice, &["cut each other", "tool.stl"]),
+        (&deeper, &["body \"ball\" overlaps the rigid body \"tool\" by", "move one of them"]),
+    ] {
+        let outcome = with_file(&rigid, "tool.stl", &stl(triangles));
+        let said = outcome.said();
+        assert_eq!(outcome.code, 2, "{said}");
+        assert!(words.iter().all(|word| said.contains(word)), "{words:?}: {said}");
+        assert!(!outcome.folder.path().join("out").exists(), "{said}");
+    }
+    let staged = rigid
+        .replace("steps = 1\n", "")
+        .replace(
+            "[method]",
+            "[[stage]]\nname = \"one\"\nsteps = 1\n[[stage]]\nname = \"two\"\nsteps = 1\n[method]",
+        )
+        .replace("density = 1000.0", "density = 1000.0\nuntil = \"one\"");
+    let from = staged.find("[[rigid]]").expect("a rigid body");
+    let to = staged.find("[[verify]]").expect("a verification");
+    let load = "[[load]]\ntraction = { value = [0, 0, -1e3], side = \"back\" }\n";
+    let outcome = Run::text(&format!("{}{load}{}", &staged[..from], &staged[to..])).attempt();
+    let said = outcome.said();
+    assert_eq!(outcome.code, 2, "{said}");
+    assert!(
+        said.contains("after that has gone with stage") && said.contains("until = \"one\""),
+        "{said}"
+    );
+}
+
 /// A run does not go on with another file of triangles under the name of the first one.
 #[test]
 fn a_restart_knows_its_files() {

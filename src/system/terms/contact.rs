@@ -14,7 +14,7 @@ use crate::contact::free::FreeBody;
 use crate::contact::law::{Friction, Law, Reached, Response};
 use crate::contact::pose::Pose;
 use crate::contact::{Contacts, Near, Pair};
-use crate::deck::model::Basis;
+use crate::deck::model::{AnalysisType, Basis};
 use crate::grid::Grid;
 use crate::grid::bins::REACH;
 use crate::points::Points;
@@ -30,8 +30,10 @@ use crate::tensor::dense::dot;
 use super::term::{At, Correction, Health, Part, Term};
 use super::touching::{Corner, Exerted, Finished};
 
-/// Cells within which a corner may come to a surface in a step.
+/// Cells within which a corner may come to a surface in an implicit step.
 const MARGIN: f64 = 2.0;
+/// The same in an explicit step, in which waves pass at most one cell, and points far less.
+const MARGIN_EXPLICIT: f64 = 0.5;
 /// Cells from a surface within which a corner counts as touching it: what rests on a surface without
 /// a load is held by it.
 pub const TOUCH: f64 = 1e-9;
@@ -61,6 +63,10 @@ pub struct ContactTerm<const D: usize> {
     contacts: Arc<Contacts<D>>,
     /// m
     cell: f64,
+    /// Distance from a surface within which corners are looked at, m.
+    margin: f64,
+    /// The forces of the step's start act in it.
+    explicit: bool,
     /// Of the rigid bodies at the step's start and at its end.
     poses: [Vec<Pose<D>>; 2],
     /// Of each pair's forces that are left at both: 1, and less where it goes.
@@ -88,7 +94,11 @@ impl<const D: usize> ContactTerm<D> {
             return None;
         }
         let [start, end] = [span.start(), span.end()];
+        let explicit = model.deck.analysis.kind == AnalysisType::Explicit;
+        let cells = if explicit { MARGIN_EXPLICIT } else { MARGIN };
         let mut term = ContactTerm {
+            margin: cells * model.grid.cell_size(),
+            explicit,
             contacts: Arc::clone(contacts),
             cell: model.grid.cell_size(),
             poses: [contacts.poses(start), contacts.poses(end)],
@@ -136,8 +146,9 @@ impl<const D: usize> ContactTerm<D> {
         let surface = &self.contacts.rigids[pair.rigid].surface;
         let (low, high) = surface.bounds();
         // A domain that turns or shears reaches further than its half lengths.
-        let reach = 2.0 * half.iter().sum::<f64>() + MARGIN * self.cell;
-        self.poses.iter().any(|poses| {
+        let reach = 2.0 * half.iter().sum::<f64>() + self.margin;
+        let moments = if self.explicit { 1 } else { 2 };
+        self.poses.iter().take(moments).any(|poses| {
             let place = poses[pair.rigid].to_body(x);
             let inside = |a: usize| place[a] >= low[a] - reach && place[a] <= high[a] + reach;
             (0..D).all(inside) && surface.near(&place).gap <= reach
@@ -159,6 +170,9 @@ impl<const D: usize> ContactTerm<D> {
         let surface = &*contacts.rigids[of.rigid].surface;
         for (corner, place) in corners.positions.iter().take(corners.count).enumerate() {
             let near = self.poses[0][of.rigid].near(surface, place);
+            if self.explicit && near.gap > self.margin {
+                continue;
+            }
             let entries = self.interpolate(&model.grid, basis, mesh, points, p, place);
             let slot = first + corner * D;
             let pose = &self.poses[0][of.rigid];
