@@ -3,6 +3,7 @@
 mod common;
 
 use common::run::{Run, relative_difference};
+use common::validation::record_in;
 
 /// A column between smooth walls.
 const COLUMN: &str = r#"
@@ -139,6 +140,24 @@ fn a_slope_stands_by_the_factor_of_the_charts() {
     let end = tried.len();
     let (a, b) = (whole.points(end), part.points(end));
     assert!(relative_difference(a.field("stress"), b.field("stress")) < 1e-6);
+}
+
+/// Griffiths and Lane (1999) 1.40, Bishop and Morgenstern (1960) 1.38, each with 0.03, at h and h/2; the table of
+/// docs/evidence/validation-soil.md.
+#[test]
+#[ignore = "half a minute; writes the table"]
+fn a_slope_keeps_its_factor_on_smaller_cells() {
+    let mut rows = Vec::new();
+    for h in [1.0, 0.5] {
+        let results = Run::of("slope").set(format!("grid.h={h}")).ranks(2).results();
+        let factor = results.number("strength_factor");
+        assert!((1.35..=1.43).contains(&factor), "h = {h}: {factor}");
+        let source = "1.38 to 1.40, Griffiths and Lane (1999), Bishop and Morgenstern (1960)";
+        let row = [&h.to_string(), source, "0.03", &format!("{factor:.3}")];
+        rows.push(row.map(str::to_string).to_vec());
+    }
+    let header = ["h [m]", "number and source", "tolerance", "here"];
+    record_in("validation-soil.md", "slope", &header, &rows);
 }
 
 #[test]
