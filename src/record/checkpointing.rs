@@ -125,14 +125,19 @@ pub fn physics_of(world: &World, deck: &Deck) -> Result<Physics> {
     if let GridSource::Mesh(mesh) = &deck.grid
         && let MeshSource::File(path) = &mesh.source
     {
-        let sum = checksum_of_file(world, path, "the mesh")?;
+        let sum = checksum_of_file(world, path, |reason| {
+            format!("cannot read the mesh {}: {reason}", path.display())
+        })?;
         physics.push_line(&format!("checksum of the mesh file = {sum:016x}"));
     }
     let mut solids = Vec::new();
-    for body in &deck.bodies {
+    for (index, body) in deck.bodies.iter().enumerate() {
         match &body.source {
             BodySource::File(file) => {
-                let sum = checksum_of_file(world, &file.path, "the points")?;
+                let sum = checksum_of_file(world, &file.path, |reason| {
+                    let message = format!("cannot read {}: {reason}", file.path.display());
+                    deck.places.say(&format!("body.{index}.shape.points"), &message)
+                })?;
                 physics.push_line(&checksum_line(&file.path, sum));
             }
             BodySource::Shape { shape, .. } => shape.solids(&mut solids),
@@ -157,13 +162,16 @@ fn checksum_line(path: &Path, sum: u64) -> String {
     format!("checksum of {name} = {sum:016x}")
 }
 
-/// Collective. Error: it cannot be read; `what` names it.
-fn checksum_of_file(world: &World, path: &Path, what: &str) -> Result<u64> {
+/// Collective. Error: it cannot be read, as `message` says with the reason.
+fn checksum_of_file(
+    world: &World,
+    path: &Path,
+    message: impl Fn(&dyn std::fmt::Display) -> String,
+) -> Result<u64> {
     let mut sum = 0_u64;
     on_root(world.comm(), || {
-        let bytes = input_file::read(path, input_file::DATA).map_err(|reason| {
-            Error::Input(format!("cannot read {what} {}: {reason}", path.display()))
-        })?;
+        let bytes = input_file::read(path, input_file::DATA)
+            .map_err(|reason| Error::Input(message(&reason)))?;
         sum = checksum_of_bytes(&bytes);
         Ok(())
     })?;
