@@ -19,14 +19,14 @@ dpkg-deb --info "$package" | sed -n '/Depends/p;/Installed-Size/p;/Description/p
 root=$place/root
 rm -rf --one-file-system "$root"
 debootstrap --variant=minbase "$suite" "$root" "$mirror" >"$place/debootstrap.log"
-cp "$package" "$root/root/mpm-par.deb"
-cat >"$root/root/try.sh" <<'SCRIPT'
+cp "$package" "$root/mpm-par.deb"
+cat >"$root/try.sh" <<'SCRIPT'
 set -eu
 mount -t proc proc /proc
 mount -t sysfs sysfs /sys
 mount -t tmpfs tmpfs /dev/shm
 apt-get update -q >/dev/null
-DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends /root/mpm-par.deb >/root/apt.log
+DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends ./mpm-par.deb >apt.log
 useradd --create-home user
 su user -s /bin/bash -c 'set -euo pipefail; cd
   mpm-par --version
@@ -38,9 +38,9 @@ su user -s /bin/bash -c 'set -euo pipefail; cd
 apt-get remove -y -q mpm-par >/dev/null
 ! command -v mpm-par
 SCRIPT
-# Mounts of its own, which end with the script.
+# Mounts of its own, which end with the script. It starts in the folder that chroot makes the top one.
 mkdir -p "$root/dev/shm"
-unshare --mount --fork chroot "$root" /usr/bin/env -i HOME=/root \
-  PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin bash /root/try.sh
+unshare --mount --fork chroot "$root" /usr/bin/env -i HOME=/ \
+  PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin bash try.sh
 rm -rf --one-file-system "$root"
 echo "deb: $package was installed, run and removed"
