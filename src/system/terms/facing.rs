@@ -69,14 +69,18 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
         of.gap + moved.sum::<f64>()
     }
 
-    /// p A at a gap, N; `None` where nothing touches.
-    fn push(&self, k: usize, gap: f64) -> Option<f64> {
+    /// ε A, N/m.
+    fn stiffness(&self, k: usize) -> f64 {
         let of = &self.couples[k];
-        let stiffness = self.contacts.body_pairs[of.pair].penalty * of.area;
-        (gap <= TOUCH * self.cell).then_some(-stiffness * gap)
+        self.contacts.body_pairs[of.pair].penalty * of.area
     }
 
-    /// Adds `share` p A W n of one element.
+    /// p A at a gap, N; `None` where nothing touches.
+    fn push(&self, k: usize, gap: f64) -> Option<f64> {
+        (gap <= TOUCH * self.cell).then(|| -self.stiffness(k) * gap)
+    }
+
+    /// Adds W n times `push` = p A of one element.
     fn add_push(&self, k: usize, push: f64, force: &mut [f64]) {
         let of = &self.couples[k];
         for (&node, weight) in self.nodes(k).iter().zip(&of.weights) {
@@ -113,8 +117,7 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
             let Some(push) = self.push(k, self.gap(k, at.displacement)) else { continue };
             self.add_push(k, -push, force);
             let Some(rows) = rows.as_deref_mut() else { continue };
-            let of = &self.couples[k];
-            let stiffness = self.contacts.body_pairs[of.pair].penalty * of.area;
+            let (of, stiffness) = (&self.couples[k], self.stiffness(k));
             block.clear();
             for of_a in &of.weights {
                 for n in &of.normal {
@@ -195,7 +198,7 @@ impl<const D: usize> Term<D> for &FacingTerm<'_, D> {
     fn add_penalties(&self, at: At<'_>, stiffness: &mut [f64]) {
         for (k, of) in self.couples.iter().enumerate() {
             if self.push(k, self.gap(k, at.displacement)).is_some() {
-                let penalty = self.contacts.body_pairs[of.pair].penalty * of.area;
+                let penalty = self.stiffness(k);
                 for (&node, w) in self.nodes(k).iter().zip(&of.weights) {
                     stiffness[node as usize] += penalty * w * w;
                 }
@@ -206,8 +209,7 @@ impl<const D: usize> Term<D> for &FacingTerm<'_, D> {
     /// A gap carries the round-off of the places.
     fn add_share_sizes(&self, _at: At<'_>, size: &mut [f64]) {
         for (k, of) in self.couples.iter().enumerate() {
-            let penalty = self.contacts.body_pairs[of.pair].penalty * of.area;
-            let force = penalty * dot(&of.place, &of.place).sqrt();
+            let force = self.stiffness(k) * dot(&of.place, &of.place).sqrt();
             for (&node, weight) in self.nodes(k).iter().zip(&of.weights) {
                 size[node as usize] += weight.abs() * force;
             }
