@@ -9,6 +9,7 @@ use std::sync::Arc;
 use crate::contact::Contacts;
 use crate::contact::told::{SLIDES, Told};
 use crate::points::Points;
+use crate::system::border::Border;
 use crate::system::facing::{Couple, DEEPEST};
 use crate::system::in_place::InPlace;
 use crate::system::model::Model;
@@ -31,9 +32,7 @@ pub struct FacingTerm<'a, const D: usize> {
     before: usize,
     /// m
     cell: f64,
-    /// Couples that reach nodes of other ranks come first.
-    order: Vec<usize>,
-    reaching: usize,
+    border: Border,
 }
 
 impl<'a, const D: usize> FacingTerm<'a, D> {
@@ -44,15 +43,12 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
         }
         let (couples, pattern) = (&mesh.facing[..], &mesh.pattern);
         let before = mesh.groups.len() + mesh.faces.len();
-        let reaches = |k: &usize| {
+        let border = Border::new((0..couples.len()).map(|k| {
             let nodes = pattern.supports.list(before + k);
             nodes.iter().any(|&node| node as usize >= mesh.numbering.owned)
-        };
-        let mut order: Vec<usize> = (0..couples.len()).collect();
-        order.sort_by_key(|k| !reaches(k));
-        let reaching = order.partition_point(reaches);
+        }));
         let (contacts, cell) = (Arc::clone(&model.contacts), model.grid.cell_size());
-        Some(FacingTerm { contacts, couples, pattern, before, cell, order, reaching })
+        Some(FacingTerm { contacts, couples, pattern, before, cell, border })
     }
 
     fn nodes(&self, k: usize) -> &'a [u32] {
@@ -109,11 +105,11 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
         mut rows: Option<&mut R>,
     ) {
         let couples = match part {
-            Part::Reaching => &self.order[..self.reaching],
-            Part::Inner => &self.order[self.reaching..],
+            Part::Reaching => &self.border.reaching,
+            Part::Inner => &self.border.inner,
         };
         let mut block = Vec::new();
-        for &k in couples {
+        for k in couples.iter().cloned().flatten() {
             let Some(push) = self.push(k, self.gap(k, at.displacement)) else { continue };
             self.add_push(k, -push, force);
             let Some(rows) = rows.as_deref_mut() else { continue };
