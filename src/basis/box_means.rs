@@ -7,8 +7,7 @@
 //! corners' cells; cells with other nodes are left out. The shares sum to one, so that linear fields stay exact
 //! whatever the domain's shape.
 
-use super::centre::{Moments, RowNodes, product_mean};
-use super::corner::Corners;
+use super::centre::{Moments, RowNodes, add_cell_gradient};
 use super::{Influences, lattice_of};
 use crate::error::Result;
 use crate::grid::{Grid, Lattice};
@@ -108,14 +107,14 @@ fn for_each_part<const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     influences: &Influences<D>,
-    corners: impl Fn(usize) -> Result<Corners<D>>,
+    corners: impl Fn(usize) -> [[f64; D]; 8],
     mut visit: impl FnMut(usize, &Part<D>),
 ) -> Result<()> {
     let lattice = lattice_of(grid)?;
     let mut found = Vec::new();
     for p in 0..points.len() {
         let row = &influences.nodes[influences.row(p)];
-        parts(lattice, &corners(p)?.positions, points.volume(p), row, &mut found);
+        parts(lattice, &corners(p), points.volume(p), row, &mut found);
         for part in &found {
             visit(p, part);
         }
@@ -129,7 +128,7 @@ pub(super) fn moments<const D: usize>(
     points: &Points<D>,
     influences: &Influences<D>,
     rows: RowNodes<'_>,
-    corners: impl Fn(usize) -> Result<Corners<D>>,
+    corners: impl Fn(usize) -> [[f64; D]; 8],
 ) -> Result<Vec<Moments>> {
     let mut sums = vec![Moments::default(); rows.count];
     for_each_part(grid, points, influences, corners, |p, part| {
@@ -149,7 +148,7 @@ pub(super) fn fill<const D: usize>(
     influences: &mut Influences<D>,
     rows: RowNodes<'_>,
     sums: &[Moments],
-    corners: impl Fn(usize) -> Result<Corners<D>>,
+    corners: impl Fn(usize) -> [[f64; D]; 8],
 ) -> Result<()> {
     let spacing = lattice_of(grid)?.spacing;
     let mut gradients = vec![[0.0; D]; influences.nodes.len()];
@@ -157,12 +156,8 @@ pub(super) fn fill<const D: usize>(
         let sum = &sums[rows.of(p)[part.entries[0]] as usize];
         let start = influences.row(p).start;
         for (corner, entry) in part.entries.iter().enumerate().take(1 << D) {
-            for (axis, value) in gradients[start + entry].iter_mut().enumerate() {
-                let others = !(1usize << axis) & ((1 << D) - 1);
-                let sign = if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-                let slope = part.share / sum[0] * sign / spacing[axis];
-                *value += slope * product_mean(&sum[..], corner, others);
-            }
+            let gradient = &mut gradients[start + entry];
+            add_cell_gradient(gradient, part.share / sum[0], sum, corner, &spacing);
         }
     })?;
     influences.centre_gradients = gradients;

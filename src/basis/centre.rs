@@ -179,13 +179,8 @@ pub(super) fn fill_from_domains<const D: usize>(
             for corner in 0..1usize << D {
                 let node = std::array::from_fn(|a| index[a] + (corner >> a & 1));
                 let at = start + place_in_row(&counts, node);
-                for axis in 0..D {
-                    let others = !(1usize << axis) & ((1 << D) - 1);
-                    let sign = if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
-                    let slope = sign / lattice.spacing[axis];
-                    influences.centre_gradients[at][axis] +=
-                        weight * slope * product_mean(&sum[..], corner, others);
-                }
+                let gradient = &mut influences.centre_gradients[at];
+                add_cell_gradient(gradient, weight, sum, corner, &lattice.spacing);
                 if rings {
                     let all = (1 << D) - 1;
                     influences.centre_hoop[at] += weight * product_mean(&sum[4..], corner, all);
@@ -201,9 +196,25 @@ fn place_in_row<const D: usize>(counts: &[usize; D], index: [usize; D]) -> usize
     (0..D).rev().fold(0, |place, axis| place * (counts[axis] + 1) + index[axis])
 }
 
+/// Adds `weight` times Σ V ∇N of the node at `corner` (a bit per axis) of a cell with these `moments`, 1/m.
+pub(super) fn add_cell_gradient<const D: usize>(
+    gradient: &mut [f64; D],
+    weight: f64,
+    moments: &Moments,
+    corner: usize,
+    spacing: &[f64; D],
+) {
+    for axis in 0..D {
+        let others = !(1usize << axis) & ((1 << D) - 1);
+        let sign = if corner >> axis & 1 == 1 { 1.0 } else { -1.0 };
+        let slope = sign / spacing[axis];
+        gradient[axis] += weight * slope * product_mean(&moments[..], corner, others);
+    }
+}
+
 /// Σ V Π_a N_a over the `axes` (bits), N_a = ξ_a at the upper end of axis a and 1 - ξ_a at the lower one, the
 /// ends those of `corner`.
-pub(super) fn product_mean(moments: &[f64], corner: usize, axes: usize) -> f64 {
+fn product_mean(moments: &[f64], corner: usize, axes: usize) -> f64 {
     let (upper, lower) = (corner & axes, !corner & axes);
     // Π (1 - ξ) over the lower ends is the alternating sum over their subsets.
     let (mut sum, mut subset) = (0.0, lower);

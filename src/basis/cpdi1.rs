@@ -78,7 +78,7 @@ impl<const D: usize> Basis<D> for Cpdi1 {
         influences: &Influences<D>,
         rows: RowNodes<'_>,
     ) -> Result<Vec<Moments>> {
-        box_means::moments(grid, points, influences, rows, |p| corners(points, p))
+        box_means::moments(grid, points, influences, rows, |p| corner_positions(points, p))
     }
 
     fn fill_cell_rows(
@@ -89,7 +89,7 @@ impl<const D: usize> Basis<D> for Cpdi1 {
         rows: RowNodes<'_>,
         sums: &[Moments],
     ) -> Result<()> {
-        box_means::fill(grid, points, influences, rows, sums, |p| corners(points, p))
+        box_means::fill(grid, points, influences, rows, sums, |p| corner_positions(points, p))
     }
 }
 

@@ -80,7 +80,7 @@ impl<const D: usize> Basis<D> for Cpdi2 {
         influences: &Influences<D>,
         rows: RowNodes<'_>,
     ) -> Result<Vec<Moments>> {
-        box_means::moments(grid, points, influences, rows, |p| corners(points, p))
+        box_means::moments(grid, points, influences, rows, |p| points.corners[p])
     }
 
     fn fill_cell_rows(
@@ -91,7 +91,7 @@ impl<const D: usize> Basis<D> for Cpdi2 {
         rows: RowNodes<'_>,
         sums: &[Moments],
     ) -> Result<()> {
-        box_means::fill(grid, points, influences, rows, sums, |p| corners(points, p))
+        box_means::fill(grid, points, influences, rows, sums, |p| points.corners[p])
     }
 }
 
