@@ -15,7 +15,7 @@ use rustc_hash::FxHashMap;
 use std::f64::consts::TAU;
 
 use super::model::Model;
-use super::terms::surface::{NO_WEIGHT, carried_area, in_space, place_of};
+use super::terms::surface::{area_of, grid_weights, place_of};
 use crate::basis::Influences;
 use crate::deck::model::Basis;
 use crate::error::Result;
@@ -167,19 +167,7 @@ impl<const D: usize> Face<D> {
     /// What the nodes of the carrier move a place beside it by: S + ∇S·(x - x_p), or the functions N(x)
     /// of a `grid` whose nodes there are among them ([`super::terms::surface`]).
     fn weights_at(&self, x: &[f64; D], grid: Option<&Grid<D>>) -> Vec<f64> {
-        let of_grid = || {
-            let values = grid?.interpolate(x, 0.0, None)?.values;
-            let mut weights = vec![0.0; self.nodes.len()];
-            for (node, &weight) in values.nodes.iter().zip(&values.weights).take(values.count) {
-                match self.nodes.iter().position(|own| own == node) {
-                    Some(a) => weights[a] = weight,
-                    None if weight.abs() < NO_WEIGHT => {}
-                    None => return None,
-                }
-            }
-            Some(weights)
-        };
-        of_grid().unwrap_or_else(|| {
+        grid.and_then(|grid| grid_weights(grid, x, &self.nodes)).unwrap_or_else(|| {
             let offset: [f64; D] = std::array::from_fn(|i| x[i] - self.centre[i]);
             let of_node = |(s, g): (&f64, &[f64; D])| s + dot(g, &offset);
             self.weights.iter().zip(&self.gradients).map(of_node).collect()
@@ -226,12 +214,10 @@ fn own_faces<const D: usize>(
                 continue;
             }
             let row = influences.row(p);
-            let mut area = carried_area(&in_space(points, p), &own.element.area);
+            let area = area_of(points, p, own, &place, rings);
             let (mut weights, mut around) = (influences.weights[row.clone()].to_vec(), 1.0);
             if rings {
-                // Around the axis it has grown with the radius, which follows the mean that is not
-                // weighted by it.
-                area = area.map(|a| a * place[0] / own.element.place[0]);
+                // The place of a ring follows the mean that is not weighted by the radius.
                 around = TAU * place[0];
                 weights.copy_from_slice(&influences.hoop[row.clone()]);
                 let whole: f64 = weights.iter().sum();

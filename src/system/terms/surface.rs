@@ -66,7 +66,7 @@ enum Kind<'a, const D: usize> {
 }
 
 /// Weights up to this are those of round-off.
-pub(crate) const NO_WEIGHT: f64 = 1e-12;
+const NO_WEIGHT: f64 = 1e-12;
 
 /// What a support bears, this rank's share: force, sum of magnitudes, torque about z through the
 /// origin, and volume of the points that carry it.
@@ -183,11 +183,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                 self.weights.extend(weights.iter().zip(gradients).map(of_node));
             }
         }
-        let mut area = carried_area(&in_space(points, point), &own.element.area);
-        if !step.influences.hoop.is_empty() {
-            // Around the axis it has grown with the radius.
-            area = area.map(|a| a * place[0] / own.element.place[0]);
-        }
+        let area = area_of(points, point, own, &place, !step.influences.hoop.is_empty());
         self.acts.push(Act {
             point,
             group: step.groups.group_of_point[point],
@@ -203,19 +199,10 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
     /// Gives the last action the weights N_a(x_s) of the grid, if its carrier reaches all of their nodes.
     fn weigh_by_grid(&mut self, grid: &Grid<D>, step: StepPoints<'_, D>) {
         let Some(act) = self.acts.last() else { return };
-        let Some(at) = grid.interpolate(&act.place, 0.0, None) else { return };
         let nodes = &step.influences.nodes[step.influences.row(act.point)];
-        let mut weights = vec![0.0; nodes.len()];
-        for (&node, &weight) in at.values.nodes.iter().zip(&at.values.weights).take(at.values.count)
-        {
-            match nodes.binary_search(&node) {
-                Ok(a) => weights[a] = weight,
-                // Nodes off a face that the element lies on.
-                Err(_) if weight.abs() < NO_WEIGHT => {}
-                Err(_) => return,
-            }
+        if let Some(weights) = grid_weights(grid, &act.place, nodes) {
+            self.weights[act.weights..].copy_from_slice(&weights);
         }
-        self.weights[act.weights..].copy_from_slice(&weights);
     }
 
     /// Adds this rank's shares of the force at an iterate, N, and the tangent of its negative where
@@ -458,7 +445,7 @@ fn add_products<const D: usize, T>(
 }
 
 /// F of a point in the axes of the grid.
-pub(crate) fn in_space<const D: usize>(points: &Points<D>, p: usize) -> dense::Square<D> {
+fn in_space<const D: usize>(points: &Points<D>, p: usize) -> dense::Square<D> {
     let gradient = &points.deformation_gradient[p];
     std::array::from_fn(|i| std::array::from_fn(|j| gradient[(i, j)]))
 }
@@ -469,11 +456,39 @@ pub fn place_of<const D: usize>(points: &Points<D>, p: usize, own: &Carried<D>) 
     std::array::from_fn(|i| points.position[p][i] + offset[i])
 }
 
-/// det F F^-T A (Nanson).
-pub(crate) fn carried_area<const D: usize>(
-    gradient: &dense::Square<D>,
-    area: &[f64; D],
+/// Area vector of an element that is at `place` now, m2 (m in 2D). Around the axis a ring has grown with its radius.
+pub(crate) fn area_of<const D: usize>(
+    points: &Points<D>,
+    p: usize,
+    own: &Carried<D>,
+    place: &[f64; D],
+    rings: bool,
 ) -> [f64; D] {
+    let area = carried_area(&in_space(points, p), &own.element.area);
+    if rings { area.map(|a| a * place[0] / own.element.place[0]) } else { area }
+}
+
+/// The grid's functions N(x) at these `nodes`, ascending; `None` where others have a weight.
+pub(crate) fn grid_weights<const D: usize>(
+    grid: &Grid<D>,
+    x: &[f64; D],
+    nodes: &[usize],
+) -> Option<Vec<f64>> {
+    let values = grid.interpolate(x, 0.0, None)?.values;
+    let mut weights = vec![0.0; nodes.len()];
+    for (&node, &weight) in values.nodes.iter().zip(&values.weights).take(values.count) {
+        match nodes.binary_search(&node) {
+            Ok(a) => weights[a] = weight,
+            // Nodes off a face that the place lies on.
+            Err(_) if weight.abs() < NO_WEIGHT => {}
+            Err(_) => return None,
+        }
+    }
+    Some(weights)
+}
+
+/// det F F^-T A (Nanson).
+fn carried_area<const D: usize>(gradient: &dense::Square<D>, area: &[f64; D]) -> [f64; D] {
     let (inverse, determinant) = dense::inverse(gradient);
     std::array::from_fn(|i| determinant * (0..D).map(|j| inverse[j][i] * area[j]).sum::<f64>())
 }
