@@ -9,7 +9,7 @@ mod report;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use report::machine;
+use report::{children_seconds, machine};
 
 /// Counted runs of each kind.
 const RUNS: usize = 3;
@@ -56,18 +56,6 @@ fn step(folder: &Path, cells: usize, friction: Option<f64>) -> f64 {
         children_seconds() - before
     });
     (long - short) / (STEPS[1] - STEPS[0]) as f64
-}
-
-/// Processor time of all children that have ended, s.
-fn children_seconds() -> f64 {
-    // SAFETY: the structure is plain numbers, which the call fills in.
-    let usage = unsafe {
-        let mut usage: libc::rusage = std::mem::zeroed();
-        libc::getrusage(libc::RUSAGE_CHILDREN, &mut usage);
-        usage
-    };
-    let seconds = |t: libc::timeval| t.tv_sec as f64 + 1e-6 * t.tv_usec as f64;
-    seconds(usage.ru_utime) + seconds(usage.ru_stime)
 }
 
 fn main() {

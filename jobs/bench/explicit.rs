@@ -17,7 +17,7 @@ use std::process::{Command, Stdio};
 
 use counts::Numbers;
 use limits::Machine;
-use report::machine;
+use report::{children_seconds, machine};
 
 /// Counted pairs of runs of each case.
 const PAIRS: usize = 5;
@@ -163,18 +163,6 @@ fn iterations(history: &Path) -> f64 {
         .and_then(|mut titles| titles.position(|title| title.starts_with("linear_iterations")))
         .expect("the column");
     lines.filter_map(|mut cells| cells.nth(column)?.parse::<f64>().ok()).sum()
-}
-
-/// Processor time of all children that have ended, s.
-fn children_seconds() -> f64 {
-    // SAFETY: the structure is plain numbers, which the call fills in.
-    let usage = unsafe {
-        let mut usage: libc::rusage = std::mem::zeroed();
-        libc::getrusage(libc::RUSAGE_CHILDREN, &mut usage);
-        usage
-    };
-    let seconds = |t: libc::timeval| t.tv_sec as f64 + 1e-6 * t.tv_usec as f64;
-    seconds(usage.ru_utime) + seconds(usage.ru_stime)
 }
 
 fn median(mut values: Vec<f64>) -> f64 {

@@ -85,3 +85,15 @@ pub fn resident_bytes() -> f64 {
         status.split_whitespace().nth(1).and_then(|word| word.parse().ok()).unwrap_or(0.0);
     pages * 4096.0
 }
+
+/// Processor time of all children that have ended, s.
+pub fn children_seconds() -> f64 {
+    // SAFETY: the structure is plain numbers, which the call fills in.
+    let usage = unsafe {
+        let mut usage: libc::rusage = std::mem::zeroed();
+        libc::getrusage(libc::RUSAGE_CHILDREN, &mut usage);
+        usage
+    };
+    let seconds = |t: libc::timeval| t.tv_sec as f64 + 1e-6 * t.tv_usec as f64;
+    seconds(usage.ru_utime) + seconds(usage.ru_stime)
+}
