@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::on_ranks;
 use common::product::product;
-use common::run::{Results, Run, relative_difference};
+use common::run::{Results, Run, last, relative_difference};
 use mpi::environment::Universe;
 use mpi::traits::*;
 use mpm_par::deck;
@@ -57,10 +57,6 @@ friction = "rough"
 [output]
 fields = ["displacement", "stress"]
 "#;
-
-fn last(results: &Results, name: &str) -> f64 {
-    *results.history(name).last().expect("a row")
-}
 
 /// A pressure p goes g = p h / (f E) deep, exactly on a flat surface; floor and plate balance.
 #[test]

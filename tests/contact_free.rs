@@ -4,11 +4,7 @@ mod common;
 #[path = "common/program.rs"]
 mod program;
 
-use common::run::{Results, Run, relative_difference};
-
-fn last(results: &Results, name: &str) -> f64 {
-    *results.history(name).last().expect("a row")
-}
+use common::run::{Results, Run, last, relative_difference};
 
 fn impulse(results: &Results, column: &str) -> f64 {
     let steps = results.history("dt");

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::on_ranks;
 use common::product::product;
-use common::run::{Results, Run, relative_difference};
+use common::run::{Results, Run, last, relative_difference};
 use mpi::environment::Universe;
 use mpi::traits::*;
 use mpm_par::deck;
@@ -18,10 +18,6 @@ use mpm_par::system::scatter::BlockMatrix;
 use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::facing::FacingTerm;
 use mpm_par::system::terms::term::{At, Part};
-
-fn last(results: &Results, name: &str) -> f64 {
-    *results.history(name).last().expect("a row")
-}
 
 /// Halves of two equal cylinders (axisymmetric: balls) of radius 2, of which the upper one is driven.
 fn round(h: f64) -> String {

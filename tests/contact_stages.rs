@@ -4,7 +4,7 @@ mod common;
 #[path = "common/program.rs"]
 mod program;
 
-use common::run::{Results, Run, relative_difference};
+use common::run::{Run, last, relative_difference};
 
 /// A block on a floor, a plate that presses it, and a stage after that.
 const STAGED: &str = r#"
@@ -46,10 +46,6 @@ friction = 0.2
 between = ["block", "plate"]
 friction = "rough"
 "#;
-
-fn last(results: &Results, name: &str) -> f64 {
-    *results.history(name).last().expect("a row")
-}
 
 /// The forces of a contact that goes fall to nothing over its last stage, and the block springs back.
 #[test]

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use common::on_ranks;
 use common::product::product;
-use common::run::{PointTable, Results, Run, input, relative_difference};
+use common::run::{PointTable, Results, Run, input, last, relative_difference};
 use mpi::environment::Universe;
 use mpi::traits::*;
 use mpm_par::deck;
@@ -40,10 +40,6 @@ fn aligned(degrees: f64, h: f64) -> Run {
         .set("grid.size=[2,1.5]")
         .set("boundary=[{where={side=\"bottom\"},fix=[\"y\"]},{where={side=\"left\"},fix=[\"x\"]}]")
         .set(format!("load=[{{gravity=[{x},{y}]}}]"))
-}
-
-fn last(results: &Results, name: &str) -> f64 {
-    *results.history(name).last().expect("a row")
 }
 
 /// Place, displacement and stress (xx, xy, yy) of each point in axes turned by `degrees`, ordered by

@@ -295,6 +295,11 @@ impl PointTable {
     }
 }
 
+/// The last entry of a column of the history.
+pub fn last(results: &Results, name: &str) -> f64 {
+    *results.history(name).last().expect("a row")
+}
+
 /// Largest difference over the largest magnitude of `b`; infinite if the lengths differ.
 pub fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     if a.len() != b.len() {
