@@ -171,7 +171,7 @@ fn in_stages(deck: &str) -> String {
         .replace("[output]", &format!("{stages}[output]"))
 }
 
-/// Each names key or place, and the cure.
+/// Each wrong deck is refused by a message that names the key or the place, and the cure.
 #[test]
 fn what_soils_and_stages_cannot_have_is_named() {
     let with = |from: &str, to: &str| {

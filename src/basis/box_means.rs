@@ -23,7 +23,7 @@ struct Part<const D: usize> {
     entries: [usize; 8],
 }
 
-/// First and last point of an interval along one axis in cells, with the cells that it meets.
+/// The part of [low, high] inside the grid along one axis, in cells, and the first and last cell that it meets.
 fn reach(low: f64, high: f64, cells: usize) -> (f64, f64, usize, usize) {
     let end = cells as f64;
     // A domain may stick out of the grid; conversion to usize saturates at zero.

@@ -175,7 +175,8 @@ impl<const D: usize> Face<D> {
     }
 }
 
-/// Elements of this rank's points near any other body that theirs may touch. Collective.
+/// Surface elements that this rank's points carry, if they lie within `reach` of a body that their own body may
+/// touch. Collective.
 fn own_faces<const D: usize>(
     world: &World,
     model: &Model<D>,

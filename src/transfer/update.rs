@@ -215,7 +215,7 @@ enum IncrementFault {
     Leaves(String),
 }
 
-/// Whether [`fault_of`] finds nothing: what nearly every point is asked, in the fewest operations.
+/// Whether [`fault_of`] finds nothing. Nearly every point passes, so that this test takes few operations.
 #[inline(always)]
 fn is_sound<const D: usize>(
     p: usize,

@@ -71,7 +71,7 @@ fn a_round_column_of_sand_runs_out_as_measured() {
         let points = results.points(results.count("steps_completed"));
         let radius = points.component("position", 0);
         let start = radius.iter().zip(points.component("displacement", 0)).map(|(x, u)| x - u);
-        // A ring's mass is its first radius times what is the same for all.
+        // A ring's mass is its first radius times one number for all rings.
         let mut rings: Vec<(f64, f64)> = radius.iter().copied().zip(start).collect();
         rings.sort_by(|a, b| a.0.total_cmp(&b.0));
         let all: f64 = rings.iter().map(|ring| ring.1).sum();

@@ -32,7 +32,8 @@ use super::touching::{Corner, Exerted, Finished};
 
 /// Cells within which a corner may come to a surface in an implicit step.
 const MARGIN: f64 = 2.0;
-/// The same in an explicit step, in which waves pass at most one cell, and points far less.
+/// Cells within which a corner may come to a surface in an explicit step: waves pass at most one cell in it, points
+/// far less.
 const MARGIN_EXPLICIT: f64 = 0.5;
 /// Cells from a surface within which a corner counts as touching it: what rests on a surface without
 /// a load is held by it.

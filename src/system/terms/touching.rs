@@ -98,7 +98,7 @@ pub struct Met {
     pub friction: f64,
     /// Lost along the normals, where bodies meet, J.
     pub impact: f64,
-    /// In penalties at the step's end, J.
+    /// Energy that the penalties store at the step's end, J.
     pub energy: f64,
 }
 
