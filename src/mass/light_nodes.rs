@@ -35,6 +35,8 @@ pub struct LightNodes {
     light: Vec<bool>,
     /// Σ_p g_Ip at local light nodes, kg.
     coupling: Vec<f64>,
+    /// Points that reach light nodes and have others, ascending, and the weight of the others.
+    carriers: Vec<(usize, f64)>,
     /// m
     size: f64,
 }
@@ -57,25 +59,34 @@ impl LightNodes {
         if -extremes[1] > limit {
             return Ok(None);
         }
-        let mut found =
-            LightNodes { light: vec![false; mesh.numbering.len()], coupling: vec![], size };
+        let halo = &mesh.numbering.halo;
+        let suspect = |node: usize| node < owned && mass[node] <= limit;
+        let mut marks: Vec<f64> =
+            (0..mesh.numbering.len()).map(|node| f64::from(u8::from(suspect(node)))).collect();
+        halo.forward(world, &mut marks, 1)?;
+        let light: Vec<bool> = marks.iter().map(|mark| *mark > 0.0).collect();
+        // Before it is known which are light and who carries them: all points that reach them.
+        let carriers = reaching(step, &light).map(|p| (p, 1.0)).collect();
+        let mut found = LightNodes { light, coupling: vec![], carriers, size };
         let coupling = found.couplings(world, mesh, step);
-        let mut marks = vec![0.0; mesh.numbering.len()];
         for node in 0..owned {
-            let light = mass[node] <= limit && mass[node] <= OF_COUPLING * coupling[node][0];
+            let light = suspect(node) && mass[node] <= OF_COUPLING * coupling[node][0];
             marks[node] = f64::from(u8::from(light && coupling[node][0] > 0.0));
         }
-        mesh.numbering.halo.forward(world, &mut marks, 1)?;
+        halo.forward(world, &mut marks, 1)?;
         found.light = marks.iter().map(|mark| *mark > 0.0).collect();
         if !world.any(found.light[..owned].contains(&true)) {
             return Ok(None);
         }
         // Of the points that have other nodes to carry them by.
+        found.carriers = carriers_of(step, &found.light);
         found.coupling = found.couplings(world, mesh, step).into_flattened();
-        mesh.numbering.halo.forward(world, &mut found.coupling, 1)?;
+        halo.forward(world, &mut found.coupling, 1)?;
         for (light, coupling) in found.light.iter_mut().zip(&found.coupling) {
             *light &= *coupling > 0.0;
         }
+        // Nodes that nothing carries are light no more.
+        found.carriers = carriers_of(step, &found.light);
         let mut sums: Vec<[f64; 1]> = mass.iter().map(|m| [*m]).collect();
         found.hand_on(world, mesh, step, &mut sums, &[])?;
         *mass = sums.into_flattened();
@@ -103,7 +114,7 @@ impl LightNodes {
         }
         mesh.numbering.halo.forward(world, share.as_flattened_mut(), B)?;
         let [more] = over_points(world, mesh, |part, [more]: [&mut [[f64; B]]; 1]| {
-            self.for_each_carrier(step, part, |p, carrying| {
+            self.for_each_carrier(part, |p, carrying| {
                 let mut taken = [0.0; B];
                 for (node, coupling) in self.reach(step, p) {
                     for i in 0..B {
@@ -141,7 +152,7 @@ impl LightNodes {
         let halo = &mesh.numbering.halo;
         halo.forward(world, nodal, D)?;
         let [sums] = over_points(world, mesh, |part, [sums]: [&mut [[f64; D]]; 1]| {
-            self.for_each_carrier(step, part, |p, carrying| {
+            self.for_each_carrier(part, |p, carrying| {
                 let mut value = [0.0; D];
                 let row = step.influences.row(p);
                 for (&node, weight) in step.nodes_of(p).iter().zip(&step.influences.weights[row]) {
@@ -169,49 +180,26 @@ impl LightNodes {
         halo.forward(world, nodal, D)
     }
 
-    /// Σ_p g_Ip over the points that can carry, at owned nodes: of light nodes, or of all while none
-    /// is known. Collective.
+    /// Σ_p g_Ip over the carriers, at owned light nodes. Collective.
     fn couplings<const D: usize>(
         &self,
         world: &World,
         mesh: &Discretisation<D>,
         step: StepPoints<'_, D>,
     ) -> Vec<[f64; 1]> {
-        let known = self.light.contains(&true);
         let [coupling] = over_points(world, mesh, |part, [coupling]: [&mut [[f64; 1]]; 1]| {
-            if known {
-                self.for_each_carrier(step, part, |p, _| {
-                    self.reach(step, p).for_each(|(node, g)| coupling[node][0] += g);
-                });
-            } else {
-                for p in part {
-                    self.all(step, p).for_each(|(node, g)| coupling[node][0] += g);
-                }
-            }
+            self.for_each_carrier(part, |p, _| {
+                self.reach(step, p).for_each(|(node, g)| coupling[node][0] += g);
+            });
         });
         coupling
     }
 
-    /// Calls `visit` with the points among `part` that reach light nodes and have others, and the
-    /// weight of the others.
-    fn for_each_carrier<const D: usize>(
-        &self,
-        step: StepPoints<'_, D>,
-        part: Range<usize>,
-        mut visit: impl FnMut(usize, f64),
-    ) {
-        for p in part {
-            let nodes = step.nodes_of(p);
-            if !nodes.iter().any(|&node| self.light[node as usize]) {
-                continue;
-            }
-            let weights = &step.influences.weights[step.influences.row(p)];
-            let others = nodes.iter().zip(weights).filter(|(node, _)| !self.light[**node as usize]);
-            let carrying: f64 = others.map(|(_, weight)| weight).sum();
-            if carrying > ENOUGH {
-                visit(p, carrying);
-            }
-        }
+    /// Calls `visit` with the carriers among `part` and the weight of their other nodes.
+    fn for_each_carrier(&self, part: Range<usize>, mut visit: impl FnMut(usize, f64)) {
+        let start = self.carriers.partition_point(|&(p, _)| p < part.start);
+        let carriers = self.carriers[start..].iter().take_while(|&&(p, _)| p < part.end);
+        carriers.for_each(|&(p, carrying)| visit(p, carrying));
     }
 
     /// (local node, g_Ip) of the light nodes of a point.
@@ -220,22 +208,37 @@ impl LightNodes {
         step: StepPoints<'a, D>,
         p: usize,
     ) -> impl Iterator<Item = (usize, f64)> + 'a {
-        self.all(step, p).filter(|(node, _)| self.light[*node])
-    }
-
-    /// (local node, g_Ip) of a point.
-    fn all<'a, const D: usize>(
-        &self,
-        step: StepPoints<'a, D>,
-        p: usize,
-    ) -> impl Iterator<Item = (usize, f64)> + 'a {
         let (mass, size) = (step.points.mass[p], self.size);
         let row = step.influences.row(p);
         let weights = step.influences.weights[row.clone()].iter();
         let entries = weights.zip(&step.influences.gradients[row]);
-        step.nodes_of(p).iter().zip(entries).map(move |(&node, (weight, gradient))| {
-            let slope = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-            (node as usize, mass * (weight.abs() + size * slope))
-        })
+        let all = step.nodes_of(p).iter().zip(entries);
+        all.filter(|(node, _)| self.light[**node as usize]).map(
+            move |(&node, (weight, gradient))| {
+                let slope = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
+                (node as usize, mass * (weight.abs() + size * slope))
+            },
+        )
     }
+}
+
+/// Points that reach a marked node, ascending.
+fn reaching<'a, const D: usize>(
+    step: StepPoints<'a, D>,
+    marked: &[bool],
+) -> impl Iterator<Item = usize> + 'a {
+    let reaches = |group| step.nodes_of_group(group).iter().any(|&node| marked[node as usize]);
+    let groups: Vec<bool> = (0..step.groups.len()).map(reaches).collect();
+    (0..step.points.len()).filter(move |&p| groups[step.groups.group_of_point[p]])
+}
+
+/// Points that reach light nodes and have others, ascending, with the weight of the others.
+fn carriers_of<const D: usize>(step: StepPoints<'_, D>, light: &[bool]) -> Vec<(usize, f64)> {
+    let carrying = |p: usize| {
+        let weights = &step.influences.weights[step.influences.row(p)];
+        let nodes = step.nodes_of(p).iter().zip(weights);
+        let others = nodes.filter(|(node, _)| !light[**node as usize]);
+        (p, others.map(|(_, weight)| weight).sum::<f64>())
+    };
+    reaching(step, light).map(carrying).filter(|(_, carrying)| *carrying > ENOUGH).collect()
 }

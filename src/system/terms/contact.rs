@@ -27,6 +27,7 @@ use crate::system::step_system::Discretisation;
 use crate::tensor::Square;
 use crate::tensor::dense::dot;
 
+use super::node_gaps::NodeGaps;
 use super::term::{At, Correction, Health, Part, Term};
 use super::touching::{Corner, Exerted, Finished};
 
@@ -34,7 +35,7 @@ use super::touching::{Corner, Exerted, Finished};
 const MARGIN: f64 = 2.0;
 /// Cells within which a corner may come to a surface in an explicit step: waves pass at most one cell in it, points
 /// far less.
-const MARGIN_EXPLICIT: f64 = 0.5;
+const MARGIN_EXPLICIT: f64 = 0.25;
 /// Cells from a surface within which a corner counts as touching it: what rests on a surface without
 /// a load is held by it.
 pub const TOUCH: f64 = 1e-9;
@@ -126,8 +127,13 @@ impl<const D: usize> ContactTerm<D> {
             if !of.presence.is_in(span.stage) {
                 continue;
             }
+            let nodes = term.node_gaps(model, mesh, of);
+            let step = mesh.step_points(points, &model.materials);
             for p in (0..points.len()).filter(|&p| points.body[p] as usize == of.body) {
-                if term.may_touch(of, &points.position[p], &points.half_length[p]) {
+                let (x, reach) = (&points.position[p], term.reach(&points.half_length[p]));
+                let node = step.nodes_of(p).first();
+                let far = node.is_some_and(|&node| nodes.beyond(node, x, reach));
+                if !far && term.may_touch(of, x, reach) {
                     term.add_corners(model, mesh, points, (pair, of), p);
                 }
             }
@@ -137,20 +143,36 @@ impl<const D: usize> ContactTerm<D> {
         let reaches = |candidate: &Candidate<D>| {
             nodes[candidate.entries.clone()].iter().any(|&node| node as usize >= owned)
         };
-        term.candidates.sort_by_key(|candidate| !reaches(candidate));
-        term.reaching = term.candidates.iter().take_while(|c| reaches(c)).count();
+        term.reaching = term.candidates.iter().filter(|of| reaches(of)).count();
+        if term.reaching > 0 {
+            term.candidates.sort_by_cached_key(|candidate| !reaches(candidate));
+        }
         Some(term)
     }
 
+    /// Of the surface from the point within which a domain may come to it in the step, m.
+    fn reach(&self, half: &[f64; D]) -> f64 {
+        // A domain that turns or shears reaches further than its half lengths.
+        2.0 * half.iter().sum::<f64>() + self.margin
+    }
+
+    /// Of a rigid body at the moments that count for where corners are looked for.
+    fn looked_at(&self, rigid: usize) -> impl Iterator<Item = Pose<D>> + Clone {
+        let moments = if self.explicit { 1 } else { 2 };
+        self.poses.iter().take(moments).map(move |poses| poses[rigid])
+    }
+
+    fn node_gaps(&self, model: &Model<D>, mesh: &Discretisation<D>, pair: &Pair) -> NodeGaps<D> {
+        let surface = &*self.contacts.rigids[pair.rigid].surface;
+        NodeGaps::new(&model.grid, &mesh.numbering, surface, self.looked_at(pair.rigid))
+    }
+
     /// Whether the domain of a point may come to the surface in the step.
-    fn may_touch(&self, pair: &Pair, x: &[f64; D], half: &[f64; D]) -> bool {
+    fn may_touch(&self, pair: &Pair, x: &[f64; D], reach: f64) -> bool {
         let surface = &self.contacts.rigids[pair.rigid].surface;
         let (low, high) = surface.bounds();
-        // A domain that turns or shears reaches further than its half lengths.
-        let reach = 2.0 * half.iter().sum::<f64>() + self.margin;
-        let moments = if self.explicit { 1 } else { 2 };
-        self.poses.iter().take(moments).any(|poses| {
-            let place = poses[pair.rigid].to_body(x);
+        self.looked_at(pair.rigid).any(|pose| {
+            let place = pose.to_body(x);
             let inside = |a: usize| place[a] >= low[a] - reach && place[a] <= high[a] + reach;
             (0..D).all(inside) && surface.near(&place).gap <= reach
         })
@@ -548,14 +570,7 @@ impl<const D: usize> Term<D> for &ContactTerm<D> {
             let x = self.position(of, at.displacement);
             let Some((_, response)) = self.respond(of, &x) else { continue };
             let n = self.near_at_end(of, &x).normal;
-            let s: Square<D> = std::array::from_fn(|i| {
-                std::array::from_fn(|j| 0.5 * (response.stiffness[i][j] + response.stiffness[j][i]))
-            });
-            let along: [f64; D] = std::array::from_fn(|i| dot(&s[i], &n));
-            let twice = 2.0 * dot(&along, &n);
-            let coupling: Square<D> = std::array::from_fn(|i| {
-                std::array::from_fn(|j| n[i] * along[j] + along[i] * n[j] - twice * n[i] * n[j])
-            });
+            let coupling = coupling(&response.stiffness, &n);
             for (a, of_a) in self.entries(of) {
                 for (b, of_b) in self.entries(of) {
                     let factor = -of.area * of_a * of_b;
@@ -577,4 +592,15 @@ impl<const D: usize> Term<D> for &ContactTerm<D> {
             }
         }
     }
+}
+
+/// N S T + T S N of the symmetric part of a stiffness, N = n n and T = 1 - N.
+pub(super) fn coupling<const D: usize>(stiffness: &Square<D>, n: &[f64; D]) -> Square<D> {
+    let s: Square<D> =
+        std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (stiffness[i][j] + stiffness[j][i])));
+    let along: [f64; D] = std::array::from_fn(|i| dot(&s[i], n));
+    let twice = 2.0 * dot(&along, n);
+    std::array::from_fn(|i| {
+        std::array::from_fn(|j| n[i] * along[j] + along[i] * n[j] - twice * n[i] * n[j])
+    })
 }

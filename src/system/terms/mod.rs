@@ -11,6 +11,7 @@
 //! | both of these as external forces that follow the motion | `following.rs` | |
 //! | their dense blocks | `block.rs` | |
 //! | rigid surfaces | `contact.rs` | formulations.md B.5 |
+//! | which points are far from these | `node_gaps.rs` | |
 //! | two bodies in contact, in implicit steps | `facing.rs` | |
 //! | Ghost stiffness | `ghost.rs` | Ghost eq. 27, 28 |
 //! | inertia of implicit dynamics | `inertia.rs` | Ghost §3.3 |
@@ -22,6 +23,7 @@ pub mod facing;
 pub(crate) mod following;
 pub mod ghost;
 pub(crate) mod inertia;
+mod node_gaps;
 mod own_traction;
 pub mod pressure;
 mod scalar;
