@@ -17,28 +17,57 @@
 //! V ((R g_a) x r_b + r_a x (l g_b + kappa r_b) + pi/n (g_b x g_a - g_0b x g_0a)),
 //!
 //! R = dtau for L = 1, l : L = dpi, kappa = Σ R_dd: symmetric where the material's moduli are.
+//!
+//! The assembly sums the parts of the point's gradients and of its cells' apart: with s = tau - (pi/n) 1 and
+//! e_a = Σ_d g_0a of the directions,
+//!
+//! f_a = V0 (s g_a + (pi/n) e_a),
+//! K_ab = V (A' + (Q g_a) x e_b + e_a x (q g_b) + kappa/n^2 e_a x e_b - pi/n g_0b x g_0a),
+//!
+//! A' the tangent of [`super::contribution`] with s for tau and P c P for the moduli c (P takes the mean over
+//! the directions away), n Q = R - kappa/n 1, n q = l - kappa/n 1. Points that share their cells share g_0: of the
+//! last three terms the cells need the sums over the points only.
 
 use super::Increment;
 use super::tangent::Expansion;
 use crate::tensor::dense::{self, Square};
-use crate::tensor::spectral::ln_1p;
 
 /// dF_bar - 1 from dF - 1 (`increment`) and dF_0 - 1 (`centre`). Not a number where a determinant
 /// is not positive.
 #[inline]
 pub fn averaged<const D: usize>(increment: &Square<D>, centre: &Square<D>) -> Square<D> {
-    let [own, common] = [increment, centre].map(|h| ln_1p(dense::determinant_excess(h)));
-    grown(increment, ((common - own) / D as f64).exp_m1())
+    within(increment, dense::determinant_excess(centre))
 }
 
-/// ln det dF of a ring
-#[inline]
-pub(crate) fn logarithm<const D: usize>(increment: Increment<'_, D>) -> f64 {
-    ln_1p(dense::determinant_excess(increment.block)) + ln_1p(increment.hoop)
+/// [`averaged`] of det dF_0 - 1.
+#[inline(always)]
+pub(crate) fn within<const D: usize>(increment: &Square<D>, common: f64) -> Square<D> {
+    grown(increment, growth(dense::determinant_excess(increment), common, D))
+}
+
+/// det dF - 1 with the hoop
+#[inline(always)]
+pub fn volume_change<const D: usize>(increment: Increment<'_, D>) -> f64 {
+    let section = dense::determinant_excess(increment.block);
+    section + increment.hoop + section * increment.hoop
+}
+
+/// (det dF_0 / det dF)^(1/n) - 1 from the determinants less one, `own` of dF and `common` of dF_0, n = 2 or 3:
+/// with all digits where they are small.
+#[inline(always)]
+pub(crate) fn growth(own: f64, common: f64, directions: usize) -> f64 {
+    let excess = (common - own) / (1.0 + own);
+    let growth = if directions == 2 {
+        excess / (1.0 + (1.0 + excess).sqrt())
+    } else {
+        let root = (1.0 + excess).cbrt();
+        excess / (1.0 + root + root * root)
+    };
+    if own > -1.0 && common > -1.0 { growth } else { f64::NAN }
 }
 
 /// (1 + `growth`) dF - 1
-#[inline]
+#[inline(always)]
 pub(crate) fn grown<const D: usize>(increment: &Square<D>, growth: f64) -> Square<D> {
     let mut grown = *increment;
     for (i, row) in grown.iter_mut().enumerate() {

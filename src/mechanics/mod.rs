@@ -25,7 +25,7 @@ mod paper_tests;
 mod tests;
 
 pub use dilation::Dilation;
-pub use ring::{Hoop, ring_contribution};
+pub use ring::{Hoop, ring_contribution, shared_ring_contribution};
 pub use tangent::Expansion;
 pub use update::BATCH;
 
@@ -145,11 +145,29 @@ pub fn averaged_contribution<const D: usize>(
     let update = update::update(start, (&dilation::averaged(increment, centre)).into());
     let placement = Placement::new(frame, start, &dense::plus_unit(increment), 1.0);
     let contribution = placement.contribution(&update);
-    let back = (placement.back, 1.0);
-    let moduli = tangent::expansion(&update, &back, placement.scale, D);
+    let sums = tangent::sums(&update.response, D);
+    let moduli = sums.expansion(&update, (&placement.back, 0.0), placement.scale);
     let both = [increment.into(), centre.into()];
-    let dilation = Dilation::new(moduli, back, 1.0 / D as f64, both);
+    let dilation = Dilation::new(moduli, (placement.back, 1.0), 1.0 / D as f64, both);
     (contribution, dilation, update.state(&start.material))
+}
+
+/// [`contribution`] with F-bar, split for the assembly ([`dilation`]): what the point's own gradients
+/// carry, s and A', and as an [`Expansion`] what its cells' do, Q, q, kappa/n^2 and pi/n. `common` is
+/// det dF_0 - 1.
+#[inline(always)]
+pub fn shared_contribution<const D: usize>(
+    frame: Frame,
+    start: &StepStart,
+    increment: &[[f64; D]; D],
+    common: f64,
+) -> (Contribution<D>, Expansion<D>, StressState) {
+    let mut update = update::update(start, (&dilation::within(increment, common)).into());
+    let state = update.state(&start.material);
+    let placement = Placement::new(frame, start, &dense::plus_unit(increment), 1.0);
+    let sums = tangent::sums(&update.response, D).take_from(&mut update.response, D);
+    let share = sums.expansion(&update, (&placement.back, 0.0), placement.scale);
+    (placement.contribution(&update), share, state)
 }
 
 /// How a frame y lies to the current state x: T_ij = scale tau_im (dy/dx)_jm.

@@ -11,7 +11,9 @@
 
 use super::tangent;
 use super::update;
-use super::{Contribution, Dilation, Increment, Placement, StepStart, StressState, dilation};
+use super::{
+    Contribution, Dilation, Expansion, Increment, Placement, StepStart, StressState, dilation,
+};
 use crate::deck::model::Frame;
 use crate::tensor::dense::{self, Square};
 
@@ -32,15 +34,11 @@ pub struct Hoop<const D: usize> {
     pub dilation: Option<Dilation<D>>,
 }
 
-/// dF_bar - 1 of a ring, the hoop's last, from dF - 1 and dF_0 - 1. Not a number where a determinant
-/// is not positive.
+/// dF_bar - 1 of a ring, the hoop's last, from dF - 1 and det dF_0 - 1 with its hoop. Not a number where a
+/// determinant is not positive.
 #[inline]
-pub fn averaged<const D: usize>(
-    own: Increment<'_, D>,
-    centre: Increment<'_, D>,
-) -> (Square<D>, f64) {
-    let [here, common] = [own, centre].map(dilation::logarithm);
-    let growth = ((common - here) / 3.0).exp_m1();
+pub fn averaged<const D: usize>(own: Increment<'_, D>, common: f64) -> (Square<D>, f64) {
+    let growth = dilation::growth(dilation::volume_change(own), common, 3);
     (dilation::grown(own.block, growth), own.hoop + growth * (1.0 + own.hoop))
 }
 
@@ -53,30 +51,78 @@ pub fn ring_contribution<const D: usize>(
     increment: Increment<'_, D>,
     centre: Option<Increment<'_, D>>,
 ) -> (Contribution<D>, Hoop<D>, StressState) {
-    let bar = centre.map(|centre| averaged(increment, centre));
-    let straining =
-        bar.as_ref().map_or(increment, |(block, hoop)| Increment { block, hoop: *hoop });
-    let update = update::update(start, straining);
-    let growth = 1.0 + increment.hoop;
-    let whole = dense::plus_unit(increment.block);
-    let placement = Placement::new(frame, start, &whole, growth);
-    let contribution = placement.contribution(&update);
-    let start_zz = start.deformation_gradient[(2, 2)];
-    // dy/dx along the hoop.
-    let (map, back) = match frame {
-        Frame::Previous => (1.0, 1.0 / growth),
-        Frame::Updated => (1.0 / growth, 1.0),
-        Frame::Total => (start_zz, 1.0 / (start_zz * growth)),
-    };
-    let scale = placement.scale * back;
-    let stress = update.response.stress[2];
-    let (from, onto) = tangent::coupling(&update, &placement.back, scale);
-    let own = scale * back * (update.response.tangent[2][2] - stress);
-    let dilation = centre.map(|centre| {
-        let back = (placement.back, back);
-        let moduli = tangent::expansion(&update, &back, placement.scale, 3);
+    let common = centre.map(dilation::volume_change);
+    let ring = Ring::new(frame, start, increment, common);
+    let (contribution, mut hoop) = ring.contribution();
+    hoop.dilation = centre.map(|centre| {
+        let back = (ring.placement.back, ring.back);
+        let sums = tangent::sums(&ring.update.response, 3);
+        let moduli = sums.expansion(&ring.update, (&back.0, back.1), ring.placement.scale);
         Dilation::new(moduli, back, 1.0 / 3.0, [increment, centre])
     });
-    let hoop = Hoop { map, stress: scale * stress, from, onto, own, dilation };
-    (contribution, hoop, update.state(&start.material))
+    (contribution, hoop, ring.update.state(&start.material))
+}
+
+/// [`super::shared_contribution`] of a ring; `common`: det dF_0 - 1 with the hoop.
+#[inline]
+pub fn shared_ring_contribution<const D: usize>(
+    frame: Frame,
+    start: &StepStart,
+    increment: Increment<'_, D>,
+    common: f64,
+) -> (Contribution<D>, Hoop<D>, Expansion<D>, StressState) {
+    let mut ring = Ring::new(frame, start, increment, Some(common));
+    let state = ring.update.state(&start.material);
+    let response = &mut ring.update.response;
+    let sums = tangent::sums(response, 3).take_from(response, 3);
+    let back = (&ring.placement.back, ring.back);
+    let share = sums.expansion(&ring.update, back, ring.placement.scale);
+    let (contribution, hoop) = ring.contribution();
+    (contribution, hoop, share, state)
+}
+
+/// A ring's material after the step, and how the frame lies to the current state.
+struct Ring<const D: usize> {
+    update: update::Update,
+    placement: Placement<D>,
+    /// s of the frame over s of the step's start
+    map: f64,
+    /// dy/dx along the hoop
+    back: f64,
+}
+
+impl<const D: usize> Ring<D> {
+    /// With F-bar where det dF_0 - 1 is given.
+    #[inline(always)]
+    fn new(
+        frame: Frame,
+        start: &StepStart,
+        increment: Increment<'_, D>,
+        common: Option<f64>,
+    ) -> Self {
+        let bar = common.map(|common| averaged(increment, common));
+        let straining =
+            bar.as_ref().map_or(increment, |(block, hoop)| Increment { block, hoop: *hoop });
+        let update = update::update(start, straining);
+        let growth = 1.0 + increment.hoop;
+        let placement = Placement::new(frame, start, &dense::plus_unit(increment.block), growth);
+        let start_zz = start.deformation_gradient[(2, 2)];
+        let (map, back) = match frame {
+            Frame::Previous => (1.0, 1.0 / growth),
+            Frame::Updated => (1.0 / growth, 1.0),
+            Frame::Total => (start_zz, 1.0 / (start_zz * growth)),
+        };
+        Ring { update, placement, map, back }
+    }
+
+    #[inline(always)]
+    fn contribution(&self) -> (Contribution<D>, Hoop<D>) {
+        let Ring { update, placement, map, back } = self;
+        let scale = placement.scale * back;
+        let stress = update.response.stress[2];
+        let (from, onto) = tangent::coupling(update, &placement.back, scale);
+        let own = scale * back * (update.response.tangent[2][2] - stress);
+        let hoop = Hoop { map: *map, stress: scale * stress, from, onto, own, dilation: None };
+        (placement.contribution(update), hoop)
+    }
 }

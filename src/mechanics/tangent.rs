@@ -7,6 +7,7 @@
 //! M_aabb = c_ab - tau_a delta_ab, M_abab = r_ab b_b, M_abba = r_ab b_a - tau_a.
 
 use super::update::Update;
+use crate::material::Response;
 use crate::tensor::dense::{Square, dot};
 use crate::tensor::spectral::logarithm_slope;
 
@@ -86,33 +87,78 @@ pub struct Expansion<const D: usize> {
     pub trace: f64,
 }
 
-/// In the first `directions` axes, 3 with the hoop; `back` is H, `scale` s.
-#[inline]
-pub(crate) fn expansion<const D: usize>(
-    update: &Update,
-    back: &(Square<D>, f64),
-    scale: f64,
-    directions: usize,
-) -> Expansion<D> {
-    let moduli = &update.response.tangent;
-    let all = 0..directions;
-    let of_row = |a: usize| -> f64 { moduli[a][all.clone()].iter().sum::<f64>() * scale };
-    let of_column = |b: usize| -> f64 { all.clone().map(|a| moduli[a][b]).sum::<f64>() * scale };
-    let (mut rate, mut onto) = ([[0.0; D]; D], [[0.0; D]; D]);
-    for a in 0..D {
-        let here: [f64; D] = std::array::from_fn(|i| update.trial.axes[a][i]);
-        let there: [f64; D] = std::array::from_fn(|j| dot(&back.0[j], &here));
-        add(&mut rate, of_row(a), &here, &there);
-        add(&mut onto, of_column(a), &here, &there);
+/// [`Expansion`] in the principal axes.
+pub(crate) struct Sums {
+    /// sum_c c_ac
+    rate: [f64; 3],
+    /// sum_a c_ab
+    onto: [f64; 3],
+    /// Of either over the directions
+    own: f64,
+    /// Of the stresses
+    trace: f64,
+}
+
+/// Of the first `directions` axes, 3 with the hoop.
+#[inline(always)]
+pub(crate) fn sums(response: &Response, directions: usize) -> Sums {
+    let moduli = &response.tangent;
+    let mut sums = Sums { rate: [0.0; 3], onto: [0.0; 3], own: 0.0, trace: 0.0 };
+    for a in 0..directions {
+        for b in 0..directions {
+            sums.rate[a] += moduli[a][b];
+            sums.onto[b] += moduli[a][b];
+        }
+        sums.own += sums.rate[a];
+        sums.trace += response.stress[a];
     }
-    let hoop = if directions > D { back.1 } else { 0.0 };
-    Expansion {
-        rate,
-        hoop_rate: hoop * of_row(2),
-        onto,
-        hoop_onto: hoop * of_column(2),
-        own: all.clone().map(of_row).sum(),
-        trace: scale * update.response.stress[all.clone()].iter().sum::<f64>(),
+    sums
+}
+
+impl Sums {
+    /// Takes the mean stress of n directions out of `response`, which then has tau - pi/n and, with
+    /// P = 1 - 1/n, P c P. What is left is the mean's: (sum_c c_ac - kappa/n) / n, as much of the columns,
+    /// kappa/n^2 and pi/n.
+    #[inline(always)]
+    pub fn take_from(self, response: &mut Response, directions: usize) -> Sums {
+        let share = 1.0 / directions as f64;
+        let mean = share * self.own;
+        let lessen = |sums: [f64; 3]| sums.map(|sum| share * (sum - mean));
+        let (rate, onto) = (lessen(self.rate), lessen(self.onto));
+        let (own, trace) = (share * mean, share * self.trace);
+        for a in 0..directions {
+            response.stress[a] -= trace;
+            for b in 0..directions {
+                response.tangent[a][b] -= rate[a] + onto[b] + own;
+            }
+        }
+        Sums { rate, onto, own, trace }
+    }
+
+    /// Along the axes of the grid; `back` is H, the hoop's behind (zero without), `scale` s.
+    #[inline(always)]
+    pub fn expansion<const D: usize>(
+        &self,
+        update: &Update,
+        back: (&Square<D>, f64),
+        scale: f64,
+    ) -> Expansion<D> {
+        let (mut rate, mut onto) = ([[0.0; D]; D], [[0.0; D]; D]);
+        for a in 0..D {
+            let here: [f64; D] = std::array::from_fn(|i| update.trial.axes[a][i]);
+            let there: [f64; D] = std::array::from_fn(|j| dot(&back.0[j], &here));
+            add(&mut rate, scale * self.rate[a], &here, &there);
+            add(&mut onto, scale * self.onto[a], &here, &there);
+        }
+        let hoop = scale * back.1;
+        Expansion {
+            rate,
+            hoop_rate: hoop * self.rate[2],
+            onto,
+            hoop_onto: hoop * self.onto[2],
+            own: scale * self.own,
+            trace: scale * self.trace,
+        }
     }
 }
 

@@ -2,10 +2,10 @@
 //! products of a batch of points are summed in registers, tile by tile, and go straight into
 //! the sparse rows. The plain form is in `plain.rs`; a test compares the two.
 
-use crate::mechanics::dilation::{Dilation, Rows};
-use crate::mechanics::{Contribution, Hoop};
+use crate::mechanics::{Contribution, Expansion, Hoop};
 use crate::tensor::fused::multiply_add;
 
+use super::cell_rows::CellRows;
 use super::scatter::BlockRows;
 use super::support_columns::ColumnRuns;
 
@@ -24,43 +24,46 @@ pub(crate) struct Batch {
     nodes: usize,
     /// Columns of a row, filled up to whole tiles.
     stride: usize,
-    /// Rows of a point: one per axis, with axisymmetry one for the hoop, and with F-bar as many of its cells.
+    /// Lines of a point: one per axis, with axisymmetry one for the hoop. With F-bar cells have as many.
     depth: usize,
-    /// Rows of the point itself.
-    own: usize,
-    points: usize,
+    lines: usize,
+    /// First line of the point pushed last.
+    first: usize,
+    /// Lines that are filled at most, and lines that there are: with F-bar cells may follow the last point.
     capacity: usize,
-    /// g_aj: row (p, j), column a.
+    room: usize,
+    /// g_aj: line (p, j), column a.
     gradients: Vec<f64>,
-    /// A_ijkl g_bl V: plane i, row (p, j), column (b, k).
+    /// A_ijkl g_bl V: plane i, line (p, j), column (b, k).
     flux: Vec<f64>,
     /// One strip of finished rows.
     strip: Vec<f64>,
 }
 
 impl Batch {
-    /// Starts a group of points on `nodes` nodes; `rings`: each has a hoop, too; `cells`: each has rows of
-    /// its cells.
+    /// Starts a group of points on `nodes` nodes; `rings`: each has a hoop, too; `cells`: lines of cells come
+    /// between those of points.
     #[inline(always)]
     pub fn start<const D: usize>(&mut self, nodes: usize, rings: bool, cells: bool) {
         self.nodes = nodes;
         self.stride = (nodes * D).next_multiple_of(NARROW);
-        self.own = D + usize::from(rings);
-        self.depth = self.own * (1 + usize::from(cells));
-        self.points = 0;
-        self.capacity = (BATCH_VALUES / (D * self.depth * self.stride)).max(1);
+        self.depth = D + usize::from(rings);
+        self.lines = 0;
+        let points = (BATCH_VALUES / (D * self.depth * self.stride)).max(1);
+        self.capacity = points * self.depth;
+        self.room = self.capacity + if cells { 2 * self.depth } else { 0 };
         // Columns beyond the last node are never read back; they only have to exist.
-        grow(&mut self.gradients, self.capacity * self.depth * nodes);
-        grow(&mut self.flux, self.capacity * D * self.depth * self.stride);
+        grow(&mut self.gradients, self.room * nodes);
+        grow(&mut self.flux, self.room * D * self.stride);
         grow(&mut self.strip, TALL * self.stride);
     }
 
     pub fn is_full(&self) -> bool {
-        self.points == self.capacity
+        self.lines >= self.capacity
     }
 
     pub fn is_empty(&self) -> bool {
-        self.points == 0
+        self.lines == 0
     }
 
     /// Adds a point with its gradients in the frame, (node, axis).
@@ -71,15 +74,16 @@ impl Batch {
         contribution: &Contribution<D>,
     ) {
         let (nodes, stride) = (self.nodes, self.stride);
-        let first = self.points * self.depth;
-        self.points += 1;
+        let first = self.lines;
+        self.first = first;
+        self.lines += self.depth;
         for j in 0..D {
             let row = &mut self.gradients[(first + j) * nodes..(first + j + 1) * nodes];
             for (target, gradient) in row.iter_mut().zip(gradients) {
                 *target = gradient[j];
             }
         }
-        let plane = self.capacity * self.depth * stride;
+        let plane = self.room * stride;
         for i in 0..D {
             for j in 0..D {
                 let tangent =
@@ -99,69 +103,70 @@ impl Batch {
         }
     }
 
-    /// Adds what F-bar does ([`Dilation`]) to the point pushed last. `frame`: gradients and hoop rows in the
-    /// frame, the latter empty but for rings; `rows`: those of the current state; `volume` in m3.
+    /// Adds (Q g_a) x e_b of F-bar to the point pushed last, of which `share` has Q; `expansion`: e of the
+    /// nodes; `volume` in m3.
     #[inline(always)]
-    pub fn push_dilation<const D: usize, const FUSED: bool>(
+    pub fn push_share<const D: usize, const FUSED: bool>(
         &mut self,
-        (gradients, hoops): (&[[f64; D]], &[f64]),
-        rows: &[Rows<D>],
-        dilation: &Dilation<D>,
+        expansion: &[[f64; D]],
+        share: &Expansion<D>,
         volume: f64,
     ) {
-        let (nodes, stride) = (self.nodes, self.stride);
-        let first = (self.points - 1) * self.depth;
-        let common = first + self.own;
-        let plane = self.capacity * self.depth * stride;
+        let plane = self.room * self.stride;
+        let expansion = expansion.as_flattened();
+        let mut add = |i: usize, line: usize, modulus: f64| {
+            let start = i * plane + (self.first + line) * self.stride;
+            let flux = &mut self.flux[start..start + expansion.len()];
+            for (target, row) in flux.iter_mut().zip(expansion) {
+                *target = multiply_add::<FUSED>(modulus, *row, *target);
+            }
+        };
+        for i in 0..D {
+            for j in 0..D {
+                add(i, j, share.rate[i][j] * volume);
+            }
+        }
+        if self.depth > D {
+            add(0, D, share.hoop_rate * volume);
+        }
+    }
+
+    /// Adds e_a x Σ V (q g_b + kappa/n^2 e_b) - Σ V pi/n g_0b x g_0a of cells.
+    #[inline(always)]
+    pub fn push_cells<const D: usize, const FUSED: bool>(&mut self, cells: &CellRows<D>) {
+        let (nodes, stride, first) = (self.nodes, self.stride, self.lines);
+        let plane = self.room * stride;
+        let rings = self.depth > D;
+        self.lines += self.depth;
+        let line = |j: usize| (first + j) * nodes..(first + j + 1) * nodes;
         for j in 0..D {
-            let line = &mut self.gradients[(common + j) * nodes..(common + j + 1) * nodes];
-            line.iter_mut().zip(rows).for_each(|(target, row)| *target = row.common.0[j]);
+            let targets = self.gradients[line(j)].iter_mut();
+            targets.zip(&cells.gradients).for_each(|(target, (row, _))| *target = row[j]);
         }
-        let rings = !hoops.is_empty();
         if rings {
-            let line = &mut self.gradients[(common + D) * nodes..(common + D + 1) * nodes];
-            line.iter_mut().zip(rows).for_each(|(target, row)| *target = row.common.1);
+            let targets = self.gradients[line(D)].iter_mut();
+            targets.zip(&cells.gradients).for_each(|(target, (_, hoop))| *target = *hoop);
         }
-        let (moduli, back, share) = (&dilation.moduli, &dilation.back, dilation.share);
-        let pressure = moduli.trace * share * volume;
-        for (b, row) in rows.iter().enumerate() {
-            let hoop = hoops.get(b).copied().unwrap_or(0.0);
-            let change = dilation.change_of_trace((&gradients[b], hoop), &row.swelling);
-            let change = change.map(|c| c * share * volume);
-            let swelling = row.swelling.map(|r| r * volume);
+        for (b, (row, hoop)) in cells.gradients.iter().enumerate() {
+            let change = cells.change::<FUSED>(b);
+            let turn = row.map(|g| cells.trace * g);
             for i in 0..D {
-                let at = |line: usize| i * plane + line * stride + b * D;
+                let at = |j: usize| i * plane + (first + j) * stride + b * D;
                 for j in 0..D {
-                    let turn = pressure * row.own.0[i];
-                    let own = &mut self.flux[at(first + j)..][..D];
+                    let target = &mut self.flux[at(j)..][..D];
                     for k in 0..D {
-                        let mut sum = moduli.rate[i][j] * swelling[k] - back.0[j][i] * change[k];
-                        sum = multiply_add::<FUSED>(turn, back.0[j][k], sum);
-                        own[k] += sum;
+                        let same = if i == j { change[k] } else { 0.0 };
+                        target[k] = if j == k { same - turn[i] } else { same };
                     }
-                    let cells = &mut self.flux[at(common + j)..][..D];
-                    cells.fill(0.0);
-                    if i == j {
-                        cells.copy_from_slice(&change);
+                }
+                if rings {
+                    let target = &mut self.flux[at(D)..][..D];
+                    target.fill(0.0);
+                    if i == 0 {
+                        target.copy_from_slice(&change);
+                        target[0] -= cells.trace * hoop;
                     }
-                    cells[j] -= pressure * row.common.0[i];
                 }
-                if !rings {
-                    continue;
-                }
-                let cells = at(common + D);
-                if i > 0 {
-                    self.flux[cells..cells + D].fill(0.0);
-                    continue;
-                }
-                let own = &mut self.flux[at(first + D)..][..D];
-                for k in 0..D {
-                    own[k] += moduli.hoop_rate * swelling[k] - back.1 * change[k];
-                }
-                own[0] += pressure * back.1 * row.own.1;
-                let cells = &mut self.flux[cells..cells + D];
-                cells.copy_from_slice(&change);
-                cells[0] -= pressure * row.common.1;
             }
         }
     }
@@ -177,8 +182,8 @@ impl Batch {
         volume: f64,
     ) {
         let (nodes, stride) = (self.nodes, self.stride);
-        let first = (self.points - 1) * self.depth;
-        let plane = self.capacity * self.depth * stride;
+        let first = self.first;
+        let plane = self.room * stride;
         self.gradients[(first + D) * nodes..(first + D + 1) * nodes].copy_from_slice(rows);
         // What a hoop strain does to the section.
         for i in 0..D {
@@ -222,12 +227,12 @@ impl Batch {
         rows: &[(usize, usize)],
         values: &mut R,
     ) {
-        if self.points == 1 && self.depth == D {
+        if self.lines == D {
             return self.flush_one::<D, FUSED, R>(place, rows, values);
         }
-        let depth = self.points * self.depth;
-        self.points = 0;
-        let plane = self.capacity * self.depth * self.stride;
+        let depth = self.lines;
+        self.lines = 0;
+        let plane = self.room * self.stride;
         for i in 0..D {
             let flux = &self.flux[i * plane..i * plane + depth * self.stride];
             let mut a = 0;
@@ -271,7 +276,7 @@ impl Batch {
         rows: &[(usize, usize)],
         values: &mut R,
     ) {
-        self.points = 0;
+        self.lines = 0;
         match (D, place.run) {
             (2, 3) => self.products::<D, 6, FUSED, R>(place, rows, values),
             (3, 3) => self.products::<D, 9, FUSED, R>(place, rows, values),
@@ -290,7 +295,7 @@ impl Batch {
     ) {
         let (n, stride) = (self.nodes, self.stride);
         let runs = n / place.run;
-        let plane = self.capacity * D * stride;
+        let plane = self.room * stride;
         for (node, &(start, width)) in rows.iter().enumerate() {
             let positions = &place.positions[node * runs..(node + 1) * runs];
             let factors: [f64; D] = std::array::from_fn(|j| self.gradients[j * n + node]);

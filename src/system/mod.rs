@@ -12,6 +12,7 @@
 //! | `pattern.rs` | exact sparsity, and where every contribution goes |
 //! | `places.rs` | where each dense block lies in the rows |
 //! | `kernel.rs` | sums over points, tiled for vector registers |
+//! | `cell_rows.rs` | rows of cells that points share with F-bar, and their sums |
 //! | `plain.rs` | these sums once more, written as the formulas read |
 //! | `border.rs` | what waits for other ranks, and what does not |
 //! | `scatter.rs` | dense blocks into the rows of their owners |
@@ -27,6 +28,7 @@
 
 pub(crate) mod apart;
 pub mod border;
+pub(crate) mod cell_rows;
 pub mod conditions;
 pub(crate) mod face_points;
 pub(crate) mod facing;

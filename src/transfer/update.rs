@@ -112,7 +112,7 @@ pub fn averaged<const D: usize>(
         };
         let own = Increment { block: own, hoop };
         let centre = Increment { block: &centre.0, hoop: centre.1 };
-        let (block, hoop) = ring::averaged(own, centre);
+        let (block, hoop) = ring::averaged(own, dilation::volume_change(centre));
         made.blocks.push(block);
         made.hoops.push(hoop);
     }

@@ -6,13 +6,15 @@ use std::ops::Range;
 use crate::basis::{Groups, Influences};
 use crate::deck::model::{Frame, PointVolume};
 use crate::material::{Material, local};
-use crate::mechanics::dilation::Rows;
-use crate::mechanics::{self, Contribution, Dilation, Hoop, Increment, StepStart, StressState};
+use crate::mechanics::{
+    self, Contribution, Dilation, Expansion, Hoop, Increment, StepStart, StressState,
+};
 use crate::points::Points;
 use crate::tensor::dense;
 use crate::tensor::fused::{self, multiply_add};
 
 use crate::system::border::Border;
+use crate::system::cell_rows::CellRows;
 use crate::system::in_place::InPlace;
 use crate::system::kernel::Batch;
 use crate::system::numbering::Numbering;
@@ -155,23 +157,33 @@ pub fn assemble_groups<const D: usize, R: BlockRows<D>>(
     stiffness: Option<&mut R>,
 ) -> Health {
     let task = Task { step, which, frame, pattern, displacement };
+    // Two forms, so that F-bar costs the others nothing.
+    let cells = !step.influences.centre_gradients.is_empty();
     #[cfg(target_arch = "x86_64")]
     if fused::has_avx2() {
         // SAFETY: the processor has just said that it knows the instructions.
-        return unsafe { assemble_avx2(&task, force, stiffness) };
+        return unsafe {
+            match cells {
+                true => assemble_avx2::<D, true, R>(&task, force, stiffness),
+                false => assemble_avx2::<D, false, R>(&task, force, stiffness),
+            }
+        };
     }
-    task.assemble::<false, R>(force, stiffness)
+    match cells {
+        true => task.assemble::<false, true, R>(force, stiffness),
+        false => task.assemble::<false, false, R>(force, stiffness),
+    }
 }
 
 /// [`Task::assemble`] compiled for AVX2 with fused multiply-add.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
-fn assemble_avx2<const D: usize, R: BlockRows<D>>(
+fn assemble_avx2<const D: usize, const CELLS: bool, R: BlockRows<D>>(
     task: &Task<'_, D>,
     force: &mut [f64],
     stiffness: Option<&mut R>,
 ) -> Health {
-    task.assemble::<true, R>(force, stiffness)
+    task.assemble::<true, CELLS, R>(force, stiffness)
 }
 
 /// What an evaluation reads.
@@ -191,17 +203,17 @@ struct Workspace<const D: usize> {
     gradients: Vec<[f64; D]>,
     /// Of rings: hoop rows in the frame.
     hoop: Vec<f64>,
-    /// With F-bar: rows of the current state.
-    rows_now: Vec<Rows<D>>,
+    /// With F-bar
+    cells: CellRows<D>,
     /// Address and width of each node's scalar rows.
     rows: Vec<(usize, usize)>,
     batch: Batch,
 }
 
 impl<const D: usize> Task<'_, D> {
-    /// Inlined into each form so that it is compiled for that form's instructions.
+    /// With F-bar where `CELLS`. Inlined into each form so that it is compiled for that form's instructions.
     #[inline(always)]
-    fn assemble<const FUSED: bool, R: BlockRows<D>>(
+    fn assemble<const FUSED: bool, const CELLS: bool, R: BlockRows<D>>(
         &self,
         force: &mut [f64],
         mut stiffness: Option<&mut R>,
@@ -212,7 +224,7 @@ impl<const D: usize> Task<'_, D> {
             force: Vec::new(),
             gradients: Vec::new(),
             hoop: Vec::new(),
-            rows_now: Vec::new(),
+            cells: CellRows::default(),
             rows: Vec::new(),
             batch: Batch::default(),
         };
@@ -228,16 +240,21 @@ impl<const D: usize> Task<'_, D> {
             work.force.clear();
             work.force.resize(nodes.len(), [0.0; D]);
             let rings = !self.step.influences.hoop.is_empty();
-            let cells = !self.step.influences.centre_gradients.is_empty();
-            work.batch.start::<D>(nodes.len(), rings, cells);
+            work.batch.start::<D>(nodes.len(), rings, CELLS);
             if let Some(matrix) = stiffness.as_deref_mut() {
                 self.find_rows(nodes, matrix, &mut work.rows);
             }
             for &p in groups.points(group) {
-                self.add_point::<FUSED>(p, &mut work, &mut health, stiffness.is_some());
+                if CELLS {
+                    self.enter_cells::<FUSED>(p, &mut work, stiffness.is_some());
+                }
+                self.add_point::<FUSED, CELLS>(p, &mut work, &mut health, stiffness.is_some());
                 if work.batch.is_full() {
                     self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
                 }
+            }
+            if CELLS {
+                self.leave_cells::<FUSED>(&mut work, stiffness.is_some());
             }
             self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
             for (&node, sum) in nodes.iter().zip(&work.force) {
@@ -284,7 +301,7 @@ impl<const D: usize> Task<'_, D> {
     }
 
     #[inline(always)]
-    fn add_point<const FUSED: bool>(
+    fn add_point<const FUSED: bool, const CELLS: bool>(
         &self,
         p: usize,
         work: &mut Workspace<D>,
@@ -296,25 +313,22 @@ impl<const D: usize> Task<'_, D> {
         let gradients = &step.influences.gradients[row.clone()];
         let increment = displacement_gradient(gradients, |a| work.displacement[a]);
         if !step.influences.hoop.is_empty() {
-            return self.add_ring::<FUSED>(p, &increment, work, health, with_block);
+            return self.add_ring::<FUSED, CELLS>(p, &increment, work, health, with_block);
         }
-        if !step.influences.centre_gradients.is_empty() {
-            let centres = &step.influences.centre_gradients[row];
-            let centre = displacement_gradient(centres, |a| work.displacement[a]);
-            let made = respond_averaged(step, self.frame, p, [&increment, &centre], health);
-            let Some((contribution, dilation)) = made else { return };
+        if CELLS {
+            let common = work.cells.volume_change;
+            let made = respond_shared(step, self.frame, p, &increment, common, health);
+            let Some((contribution, share)) = made else { return };
             self.spread::<FUSED>(gradients, &contribution, work, with_block);
             work.hoop.clear();
-            let rows =
-                gradients.iter().zip(centres).map(|(own, common)| ((own, 0.0), (common, 0.0)));
-            return self.dilate::<FUSED>(rows, &dilation, contribution.volume, work, with_block);
+            return self.hand_over::<FUSED>(&share, contribution.volume, work, with_block);
         }
         let Some(contribution) = respond(step, self.frame, p, &increment, health) else { return };
         self.spread::<FUSED>(gradients, &contribution, work, with_block);
     }
 
     /// [`Self::add_point`] with axisymmetry; `increment` is that of the section.
-    fn add_ring<const FUSED: bool>(
+    fn add_ring<const FUSED: bool, const CELLS: bool>(
         &self,
         p: usize,
         increment: &[[f64; D]; D],
@@ -326,16 +340,11 @@ impl<const D: usize> Task<'_, D> {
         let row = influences.row(p);
         let gradients = &influences.gradients[row.clone()];
         let rows = &influences.hoop[row.clone()];
-        let nodal = |a: usize| work.displacement[a];
-        let centres = influences.centre_gradients.get(row.clone()).unwrap_or_default();
-        let centre = displacement_gradient(centres, nodal);
-        let hoops = [rows, influences.centre_hoop.get(row.clone()).unwrap_or_default()];
-        let [hoop, centre_hoop] = hoops.map(|rows| hoop_increment(rows, nodal));
+        let hoop = hoop_increment(rows, |a| work.displacement[a]);
         let increment = Increment { block: increment, hoop };
-        let centre = Increment { block: &centre, hoop: centre_hoop };
-        let averaged = (!centres.is_empty()).then_some(centre);
-        let made = respond_ring(step, self.frame, p, increment, averaged, health);
-        let Some((contribution, hoop)) = made else { return };
+        let common = CELLS.then_some(work.cells.volume_change);
+        let made = respond_ring_shared(step, self.frame, p, increment, common, health);
+        let Some((contribution, hoop, share)) = made else { return };
         self.spread::<FUSED>(gradients, &contribution, work, with_block);
         let volume = contribution.volume;
         work.hoop.clear();
@@ -346,35 +355,56 @@ impl<const D: usize> Task<'_, D> {
         if with_block {
             work.batch.push_hoop::<D, FUSED>(&work.hoop, &work.gradients, &hoop, volume);
         }
-        if let Some(dilation) = &hoop.dilation {
-            let rows = gradients.iter().zip(hoops[0].iter().copied());
-            let common = centres.iter().zip(hoops[1].iter().copied());
-            self.dilate::<FUSED>(rows.zip(common), dilation, volume, work, with_block);
+        if let Some(share) = &share {
+            self.hand_over::<FUSED>(share, volume, work, with_block);
         }
     }
 
-    /// What F-bar adds to the force and, with the block, to the tangent of a point; `rows`: of each node
-    /// those of the point and of its cells, with the hoops'.
+    /// With F-bar: sums for the cells of point `p`, after those of other cells have gone where they belong.
     #[inline(always)]
-    fn dilate<'r, const FUSED: bool>(
+    fn enter_cells<const FUSED: bool>(&self, p: usize, work: &mut Workspace<D>, with_block: bool) {
+        let influences = self.step.influences;
+        let row = influences.row(p);
+        if !work.cells.has(influences, &row) {
+            self.leave_cells::<FUSED>(work, with_block);
+            let nodal = |a: usize| work.displacement[a];
+            let block = displacement_gradient(&influences.centre_gradients[row.clone()], nodal);
+            let hoops = influences.centre_hoop.get(row.clone()).unwrap_or_default();
+            let increment = Increment { block: &block, hoop: hoop_increment(hoops, nodal) };
+            work.cells.enter(influences, row, increment);
+        }
+    }
+
+    /// Adds what the last points have handed to their cells to the force and, with the block, to the tangent.
+    #[inline(always)]
+    fn leave_cells<const FUSED: bool>(&self, work: &mut Workspace<D>, with_block: bool) {
+        if !work.cells.is_open() {
+            return;
+        }
+        let pressure = work.cells.trace;
+        for (row, force) in work.cells.expansion.iter().zip(&mut work.force) {
+            for (sum, e) in force.iter_mut().zip(row) {
+                *sum = multiply_add::<FUSED>(pressure, *e, *sum);
+            }
+        }
+        if with_block {
+            work.batch.push_cells::<D, FUSED>(&work.cells);
+        }
+        work.cells.leave();
+    }
+
+    /// Hands a point's part of F-bar to its cells.
+    #[inline(always)]
+    fn hand_over<const FUSED: bool>(
         &self,
-        rows: impl Iterator<Item = ((&'r [f64; D], f64), (&'r [f64; D], f64))>,
-        dilation: &Dilation<D>,
+        share: &Expansion<D>,
         volume: f64,
         work: &mut Workspace<D>,
         with_block: bool,
     ) {
-        work.rows_now.clear();
-        work.rows_now.extend(rows.map(|(own, common)| dilation.rows(own, common)));
-        let pressure = dilation.moduli.trace * volume;
-        for (row, force) in work.rows_now.iter().zip(&mut work.force) {
-            for (sum, r) in force.iter_mut().zip(&row.swelling) {
-                *sum = multiply_add::<FUSED>(pressure, *r, *sum);
-            }
-        }
+        work.cells.add::<FUSED>((&work.gradients, &work.hoop), share, volume, with_block);
         if with_block {
-            let frame = (&work.gradients[..], &work.hoop[..]);
-            work.batch.push_dilation::<D, FUSED>(frame, &work.rows_now, dilation, volume);
+            work.batch.push_share::<D, FUSED>(&work.cells.expansion, share, volume);
         }
     }
 
@@ -437,7 +467,41 @@ pub(crate) fn respond_ring<const D: usize>(
     sound(p, increment, &state, health).then_some((contribution, hoop))
 }
 
-/// [`respond`] with F-bar, to dF - 1 and dF_0 - 1 of its cells.
+/// [`respond_ring`] for the assembly, with F-bar in two parts where det dF_0 - 1 is given.
+#[inline(always)]
+fn respond_ring_shared<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    increment: Increment<'_, D>,
+    common: Option<f64>,
+    health: &mut Health,
+) -> Option<(Contribution<D>, Hoop<D>, Option<Expansion<D>>)> {
+    let Some(common) = common else {
+        let (contribution, hoop) = respond_ring(step, frame, p, increment, None, health)?;
+        return Some((contribution, hoop, None));
+    };
+    let (contribution, hoop, share, state) =
+        mechanics::shared_ring_contribution(frame, &start(step, p), increment, common);
+    sound(p, increment, &state, health).then_some((contribution, hoop, Some(share)))
+}
+
+/// [`respond`] with F-bar, in two parts, to dF - 1 and det dF_0 - 1 of its cells.
+#[inline(always)]
+fn respond_shared<const D: usize>(
+    step: StepPoints<'_, D>,
+    frame: Frame,
+    p: usize,
+    increment: &[[f64; D]; D],
+    common: f64,
+    health: &mut Health,
+) -> Option<(Contribution<D>, Expansion<D>)> {
+    let (contribution, share, state) =
+        mechanics::shared_contribution(frame, &start(step, p), increment, common);
+    sound(p, increment.into(), &state, health).then_some((contribution, share))
+}
+
+/// [`respond`] with F-bar as the formulas read, to dF - 1 and dF_0 - 1 of its cells.
 pub(crate) fn respond_averaged<const D: usize>(
     step: StepPoints<'_, D>,
     frame: Frame,
