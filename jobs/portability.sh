@@ -2,7 +2,7 @@
 # Builds the program with other libraries than Debian's default ones and runs the core tests:
 #   int64   Debian's PETSc with 64-bit indices; its packages are unpacked beside the build
 #   newer   PETSc's newest release, from the source package that PyPI carries, with Debian's MUMPS
-#   mpich   the same release without MUMPS, on MPICH (needs libmpich-dev mpich libhdf5-mpich-dev)
+#   mpich   the same release without MUMPS, on MPICH and its HDF5; its packages are unpacked, too
 # usage: jobs/portability.sh [int64 | newer | mpich]...      (default: int64 newer)
 #   PLACE=target/portability       where packages, libraries and builds go; nothing is installed
 #   PETSC_RELEASE=3.26.1           which release `newer` and `mpich` take
@@ -74,28 +74,42 @@ newer() {
   trial openmpi
 }
 
+# unpacked FOLDER PACKAGE...: Debian's packages, in a folder of their own instead of the system.
+unpacked() {
+  local root=$place/$1 package
+  shift
+  for package in "$@"; do
+    ls "$place/packages/${package}"_*.deb >/dev/null 2>&1 ||
+      (cd "$place/packages" && apt-get download "$package")
+    dpkg -x "$place/packages/${package}"_*.deb "$root"
+  done
+}
+
 mpich() {
-  command -v mpicc.mpich >/dev/null && [ -d "/usr/lib/$machine/hdf5/mpich" ] || {
-    echo "portability: mpich needs: apt-get install libmpich-dev mpich libhdf5-mpich-dev" >&2
-    exit 4
-  }
-  # What starts runs in scripts and tests is Open MPI's mpirun with its words.
+  local root=$place/mpich-root
+  unpacked mpich-root mpich libmpich-dev libmpich12 libhdf5-mpich-dev libhdf5-mpich-103-1 libslurm38
+  # The compiler's wrapper and the starter, for the place they are in. What starts runs in scripts and
+  # tests is Open MPI's mpirun with its words.
   mkdir -p "$place/bin"
-  cat >"$place/bin/mpirun" <<'SCRIPT'
+  sed "s#=/usr\\b#=$root/usr#; s#^sysconfdir=.*#sysconfdir=$root/etc/mpich#" \
+    "$root/usr/bin/mpicc.mpich" >"$place/bin/mpicc.mpich"
+  cat >"$place/bin/mpirun" <<SCRIPT
 #!/bin/bash
 words=()
-while [ $# -gt 0 ]; do
-  case $1 in
-    -n) words+=(-n "$2"); shift 2 ;;
-    --timeout) export MPIEXEC_TIMEOUT=$2; shift 2 ;;
+while [ \$# -gt 0 ]; do
+  case \$1 in
+    -n) words+=(-n "\$2"); shift 2 ;;
+    --timeout) export MPIEXEC_TIMEOUT=\$2; shift 2 ;;
     *) break ;;
   esac
 done
-exec mpirun.mpich "${words[@]}" "$@"
+exec $root/usr/bin/mpiexec.hydra "\${words[@]}" "\$@"
 SCRIPT
-  chmod +x "$place/bin/mpirun"
-  export PATH=$place/bin:$PATH MPICC=mpicc.mpich HDF5_DIR=/usr/lib/$machine/hdf5/mpich
-  library mpich --with-cc=mpicc.mpich --with-fc=0 --with-sowing=0
+  chmod +x "$place"/bin/mpi*
+  # Its own library of MPI first, then what the packages ask of the system.
+  export LD_LIBRARY_PATH=$root/usr/lib/$machine${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
+  export PATH=$place/bin:$PATH MPICC=$place/bin/mpicc.mpich HDF5_DIR=$root/usr/lib/$machine/hdf5/mpich
+  library mpich --with-cc="$MPICC" --with-fc=0 --with-sowing=0
   trial mpich
 }
 

@@ -9,7 +9,7 @@ use mpm_par::deck::templates::template_of;
 /// Template; what is replaced in it; by what; exit code of `--check`; words that are said.
 type Mistake = (&'static str, &'static str, &'static str, i32, &'static [&'static str]);
 
-const MISTAKES: [Mistake; 18] = [
+const MISTAKES: [Mistake; 20] = [
     // Slips of the pen.
     (
         "beam",
@@ -86,6 +86,21 @@ const MISTAKES: [Mistake; 18] = [
         &["method.locking", "\"f-bar\""],
     ),
     ("footing", "locking = \"f-bar\"", "locking = \"none\"", 0, &["locking", "f-bar"]),
+    // The stress of a soil of another weight, and of a surface that is not there.
+    (
+        "excavation",
+        "density = 1800.0  ",
+        "density = 2200.0  ",
+        0,
+        &["out of balance", "unit_weight"],
+    ),
+    (
+        "excavation",
+        "surface = 10.0",
+        "surface = 12.0",
+        0,
+        &["out of balance", "most at [1.0, 6.0] m"],
+    ),
 ];
 
 #[test]
@@ -101,6 +116,44 @@ fn typical_mistakes_are_explained() {
             assert!(said.contains(word), "{to}: not said: {word}\n{said}");
         }
         assert_eq!(outcome.files(), ["deck.toml"], "{to}: something was written");
+    }
+}
+
+/// Side "bottom" is the lowest y also where the weight acts along z.
+#[test]
+fn a_floor_of_another_axis_is_told() {
+    let deck = r#"
+[analysis]
+type = "quasi-static"
+steps = 1
+[grid]
+type = "lattice"
+size = [2, 2, 3]
+h = 1
+[material.soil]
+model = "hencky"
+young = 20e6
+poisson = 0.3
+[[body]]
+material = "soil"
+density = 1800
+shape = { box = { min = [0, 0, 0], max = [2, 2, 2] } }
+[[boundary]]
+where = { side = "bottom" }
+fix = ["x", "y", "z"]
+[[load]]
+gravity = [0, 0, -9.81]
+"#;
+    let said = |deck: &str| Run::text(deck).word("--check").attempt().stdout;
+    let warning = "the lowest z is side \"back\"";
+    assert!(said(deck).contains(warning), "{}", said(deck));
+    for good in [
+        deck.replace("\"bottom\"", "\"back\""),
+        deck.replace("[0, 0, -9.81]", "[0, -9.81, 0]"),
+        // Somebody means it.
+        deck.replace("\"bottom\"", "\"left\""),
+    ] {
+        assert!(!said(&good).contains(warning), "{}", said(&good));
     }
 }
 

@@ -119,6 +119,52 @@ fn what_balances_the_initial_stress_acts_in_full() {
     assert!(difference < 1e-12, "{difference:e}");
 }
 
+/// Two layers, the water table in the upper one: the lower one's surcharge is all that rests on its surface,
+/// with the water in it. Both rest; the total stress at the base is the weight of both.
+#[test]
+fn layers_under_a_water_table_rest_with_the_surcharge_of_what_lies_above() {
+    let soil = "[material.soil]";
+    let body = |name: &str, z: [f64; 2], density: f64, stress: &str| {
+        format!(
+            "[[body]]\nname = \"{name}\"\nmaterial = \"soil\"\ndensity = {density}\n\
+             shape = {{ box = {{ min = [0, {}], max = [4, {}] }} }}\ninitial_stress = {stress}\n",
+            z[0], z[1]
+        )
+    };
+    let upper = "{ unit_weight = 18e3, surface = 10.0, k0 = 0.6 }";
+    let lower = "{ unit_weight = 20e3, surface = 5.0, k0 = 0.5, surcharge = 90e3 }";
+    let bodies =
+        body("upper", [5.0, 10.0], 1800.0, upper) + &body("lower", [0.0, 5.0], 2000.0, lower);
+    let (before, rest) = COLUMN.split_once("[[body]]").expect("a body");
+    let (_, rest) = rest.split_once("[[boundary]]").expect("boundaries");
+    let (boundaries, rest) = rest.split_once("[[load]]\ntraction").expect("a traction");
+    let (_, figures) = rest.split_once("[[verify]]").expect("figures");
+    let deck = format!(
+        "{}{bodies}[[boundary]]{boundaries}[[verify]]{figures}[[probe]]\nname = \"base\"\nnear = [2, 0]\n\
+         fields = [\"stress.yy\", \"effective_stress.xx\"]\n",
+        before.replace(soil, "[water]\nlevel = 8\nunit_weight = 10e3\n[material.soil]")
+    );
+    let deck = deck.split_once("[[verify]]\nname = \"sideways\"").map_or(deck.clone(), |(a, b)| {
+        format!("{a}{}", &b[b.find("[[probe]]").expect("the probe")..])
+    });
+    let outcome = Run::text(&deck).set("method.basis=\"gimp\"").ranks(2).attempt();
+    assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+    assert!(!outcome.stdout.contains("out of balance"), "{}", outcome.stdout);
+    let results = outcome.results();
+    assert!(results.verify("moved") < 1e-9, "{:e} m", results.verify("moved"));
+    let probes = results.text("probes.csv");
+    let row: Vec<f64> =
+        probes.lines().last().unwrap().split(',').map(|cell| cell.parse().unwrap()).collect();
+    // The lowest points lie a quarter of a cell above the base.
+    let (total, effective) = (-(90e3 + 20e3 * 4.75), -0.5 * (90e3 + 20e3 * 4.75 - 10e3 * 7.75));
+    assert!((row[3] / total - 1.0).abs() < 1e-9, "{row:?}");
+    assert!((row[4] / effective - 1.0).abs() < 1e-9, "{row:?}");
+    // A layer forgotten: half of the ground's weight that no load of the deck explains.
+    let forgotten = Run::text(&deck.replace(", surcharge = 90e3", "")).word("--check").attempt();
+    let said = &forgotten.stdout;
+    assert!(said.contains("out of balance") && said.contains("most at [1.0, 5.0] m"), "{said}");
+}
+
 fn excavation() -> String {
     std::fs::read_to_string(input("excavation")).expect("a deck")
 }

@@ -13,6 +13,7 @@
 //! | rigid bodies that move freely | `free_bodies.rs`; in implicit steps `free_motion.rs` | Broyden 1965 |
 //! | what comes and goes with a stage | `stage_changes.rs`, `release.rs` | |
 //! | damping of dynamics | `damping.rs` | Cundall 1987 |
+//! | do initial stresses carry what acts at the start? | `initial_balance.rs` | |
 //! | load steps, cut and grown again | `load_steps.rs` | |
 //! | time steps and their stability limit | `time_steps.rs` | Ghost §3.5 |
 //! | Newton's method for a step | `newton.rs`, `convergence.rs` | Lagrangian eq. 26-30, 40 |
@@ -38,6 +39,7 @@ mod free_bodies;
 mod free_motion;
 pub(crate) mod implicit;
 mod inertial;
+pub(crate) mod initial_balance;
 pub(crate) mod load_steps;
 pub(crate) mod newmark;
 pub(crate) mod newton;

@@ -117,7 +117,7 @@ fn spectrum<const D: usize>(stress: &Matrix3<f64>) -> Spectrum {
     }
 }
 
-/// With water the stress is the effective one; what stands on the surface presses on it.
+/// With water the stress is the effective one.
 fn stress_at(initial: &InitialStress, scope: &Scope, water: Option<Water>) -> Matrix3<f64> {
     match initial {
         InitialStress::Components(all) => {
@@ -131,8 +131,8 @@ fn stress_at(initial: &InitialStress, scope: &Scope, water: Option<Water>) -> Ma
             let mut top = scope.initial;
             top[*axis] = surface;
             let pore = |x: &[f64]| water.map_or(0.0, |water| water.pressure(x));
-            let carried = pore(&scope.initial) - pore(&top);
-            let vertical = carried - (unit_weight.value(scope) * depth + surcharge.value(scope));
+            let above = surcharge.as_ref().map_or_else(|| pore(&top), |given| given.value(scope));
+            let vertical = pore(&scope.initial) - (unit_weight.value(scope) * depth + above);
             let horizontal = k0.value(scope) * vertical;
             let mut stress = Matrix3::from_diagonal_element(horizontal);
             stress[(*axis, *axis)] = vertical;

@@ -38,6 +38,7 @@ pub fn of<const D: usize>(
         plan_checks::weight_ratios(world, model, points).into_iter().unzip();
     facts.extend(ratios.into_iter().flatten());
     warnings.extend(plan_checks::angles(&deck.materials).into_iter().map(Some));
+    warnings.push(plan_checks::wrong_floor::<D>(deck));
     warnings.push(plan_checks::unstable_step(world, model, points));
     warnings.push(plan_checks::much_output(output, frames));
     warnings.push(locking::warning(world, model, points));

@@ -4,8 +4,8 @@
 use std::ops::RangeInclusive;
 
 use crate::analysis::time_steps::{TimeSteps, stability_limit};
-use crate::deck::model::{AnalysisType, Every, Load, Material};
-use crate::deck::{Presence, When, rough};
+use crate::deck::model::{AnalysisType, Every, Load, Material, Place};
+use crate::deck::{Deck, Presence, When, rough};
 use crate::loads::Moment;
 use crate::parallel::World;
 use crate::points::Points;
@@ -30,21 +30,60 @@ const MUCH_OUTPUT: f64 = 1e11;
 /// A row of the plan, and what to warn of.
 pub type Row = (Option<(String, String)>, Option<String>);
 
+/// Sum of all gravity, m/s2, as it is at the end of a quasi-static run, and at the start of a dynamic one.
+fn gravity<const D: usize>(deck: &Deck) -> [f64; D] {
+    let when = When { factor: 1.0, ..When::default() };
+    let at = Moment::new(deck.analysis.kind, Presence::default(), when);
+    let mut gravity = [0.0; D];
+    for load in &deck.loads {
+        if let Load::Gravity(g) = load {
+            gravity.iter_mut().zip(g).for_each(|(sum, g)| *sum += g.value(&at.scope()));
+        }
+    }
+    gravity
+}
+
+/// In space: a warning of a weight along x or z that nothing bears but side "bottom", which is the lowest
+/// y. Whoever calls z the vertical means another side.
+pub fn wrong_floor<const D: usize>(deck: &Deck) -> Option<String> {
+    let gravity = gravity::<D>(deck);
+    let axis = (0..D).find(|&axis| gravity[axis] != 0.0)?;
+    let alone = (0..D).all(|other| other == axis || gravity[other] == 0.0);
+    if D != 3 || axis == 1 || !alone || !deck.contacts.is_empty() {
+        return None;
+    }
+    let upper = gravity[axis] > 0.0;
+    let mut bottom_bears = false;
+    for boundary in &deck.boundaries {
+        match boundary.place {
+            Place::Side { axis: of, upper: end } if (of, end) == (axis, upper) => return None,
+            Place::Side { axis: 1, upper: false } => bottom_bears |= boundary.may_hold(axis),
+            Place::Side { .. } if !boundary.may_hold(axis) => {}
+            _ => return None,
+        }
+    }
+    let name = ["x", "y", "z"][axis];
+    let (side, end) = match (axis, upper) {
+        (0, false) => ("left", "lowest"),
+        (0, true) => ("right", "highest"),
+        (_, false) => ("back", "lowest"),
+        (_, true) => ("front", "highest"),
+    };
+    bottom_bears.then(|| {
+        format!(
+            "the weight acts along {name}, and side \"bottom\", the lowest y, alone bears it; the {end} {name} \
+             is side \"{side}\""
+        )
+    })
+}
+
 /// Weight of each body over its stiffness and strength, where gravity acts. Collective.
 pub fn weight_ratios<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
 ) -> Vec<Row> {
-    // As it is at the end of a quasi-static run, and at the start of a dynamic one.
-    let when = When { factor: 1.0, ..When::default() };
-    let at = Moment::new(model.deck.analysis.kind, Presence::default(), when);
-    let mut gravity = [0.0; D];
-    for load in &model.deck.loads {
-        if let Load::Gravity(g) = load {
-            gravity.iter_mut().zip(g).for_each(|(sum, g)| *sum += g.value(&at.scope()));
-        }
-    }
+    let gravity = gravity::<D>(&model.deck);
     let size = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
     if size == 0.0 {
         return Vec::new();

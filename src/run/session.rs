@@ -29,6 +29,7 @@ use super::start_checks::support;
 use super::{aside, element_run, plan, process, setup};
 use crate::analysis::explicit::Explicit;
 use crate::analysis::implicit::{self, Implicit};
+use crate::analysis::initial_balance;
 use crate::analysis::strength_reduction::StrengthReduction;
 use crate::analysis::{conditioning, solver, time_loop};
 use crate::output::summary::Communication;
@@ -231,6 +232,9 @@ impl Start<'_> {
                 warnings.extend(support::falls(world, &model, &points, &active, first)?);
             }
             _ => {}
+        }
+        if resume.is_none() {
+            warnings.extend(initial_balance::warning(world, &model, &points)?);
         }
         let followed = probes::find(world, &model.deck, &model.grid, &points)?;
         let plan = plan::of(world, &model, &points, &active);

@@ -118,8 +118,8 @@ pub struct K0 {
     pub surface: Expression,
     /// Horizontal over vertical effective stress.
     pub k0: Expression,
-    /// On the surface, Pa.
-    pub surcharge: Expression,
+    /// On the surface, Pa, in all; without it the water that stands there.
+    pub surcharge: Option<Expression>,
     /// The vertical one.
     pub axis: usize,
 }

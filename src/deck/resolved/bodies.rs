@@ -94,13 +94,16 @@ fn initial_stress(stress: &InitialStress) -> String {
             }
             inline(&pairs)
         }
-        InitialStress::K0(k0) => inline(&[
-            ("unit_weight", expression(&k0.unit_weight)),
-            ("surface", expression(&k0.surface)),
-            ("k0", expression(&k0.k0)),
-            ("surcharge", expression(&k0.surcharge)),
-            ("axis", quote(AXES[k0.axis])),
-        ]),
+        InitialStress::K0(k0) => {
+            let mut pairs = vec![
+                ("unit_weight", expression(&k0.unit_weight)),
+                ("surface", expression(&k0.surface)),
+                ("k0", expression(&k0.k0)),
+            ];
+            pairs.extend(k0.surcharge.as_ref().map(|value| ("surcharge", expression(value))));
+            pairs.push(("axis", quote(AXES[k0.axis])));
+            inline(&pairs)
+        }
     }
 }
 

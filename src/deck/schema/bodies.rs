@@ -67,7 +67,7 @@ pub const SECTIONS: &[Section] = &[
                 "Height of the ground's surface along the axis.").unit("m"),
             key("k0", Expression("X Y Z"), Optional("K0 needs it"),
                 "Horizontal over vertical effective stress.").range(at_least(0.0)),
-            key("surcharge", Expression("X Y Z"), Optional("0"), "Pressure on the surface.")
+            key("surcharge", Expression("X Y Z"), Optional("0; with [water], what stands on the surface"), "Pressure on the surface in all: loads, the weight of other bodies with the water in them, water that stands there. Of layers each has its own surface and surcharge.")
                 .unit("Pa").range(at_least(0.0)),
             key("axis", Choice(&AXES), Optional("the last one: y in 2D, z in 3D"),
                 "The vertical axis, upwards."),

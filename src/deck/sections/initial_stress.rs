@@ -51,7 +51,7 @@ fn k0(table: &Table<'_>, dimension: usize) -> Got<InitialStress> {
         unit_weight: unit_weight?,
         surface: surface?,
         k0: k0?,
-        surcharge: surcharge?.unwrap_or_else(zero),
+        surcharge: surcharge?,
         axis: axis?,
     })))
 }
