@@ -275,7 +275,9 @@ pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usiz
     let comm = world.comm();
     if let Some(rehearsal) = Rehearsal::new(mass::PREFIX)? {
         // The program's own preconditioner needs a mass.
-        rehearsal.linear::<1>(comm, |prefix| mass::petsc_solver(world, prefix, "jacobi"))?;
+        rehearsal.linear::<1>(comm, |prefix| {
+            mass::petsc_solver(world, prefix, "jacobi", mass::Way::Iterate)
+        })?;
     }
     if let Some(rehearsal) = Rehearsal::new(extremes::PREFIX)? {
         rehearsal.linear::<D>(comm, |prefix| extremes::petsc_solver(world, prefix))?;

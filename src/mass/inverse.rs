@@ -1,7 +1,8 @@
 //! M x = b (Ghost eq. 6, 10) for all components at once, with values prescribed at some nodes.
 //!
-//! PETSc's KSP iterates over all components of all right-hand sides as one vector: conjugate
-//! gradients with an incomplete factor that spans the ranks, or what options `-mass_...` say. It
+//! PETSc's KSP solves for all components of all right-hand sides as one vector. A small mass on one rank has a
+//! complete factor, which it applies once (`preonly`). Elsewhere it takes conjugate gradients with an
+//! incomplete factor that spans the ranks, or what options `-mass_...` say. An iteration
 //! solves for what a first guess lacks, M d = b - M x0, with each column scaled to a right-hand side
 //! near one: columns of different size (momentum beside force) share the iteration and its end.
 
@@ -11,10 +12,11 @@ use crate::parallel::World;
 use crate::petsc::KspOutcome;
 
 use super::elimination::Order;
+use super::envelope::Complete;
 use super::incomplete::Incomplete;
 use super::matrix;
-use super::solver::MassSolver;
-use super::system::{Product, System};
+use super::solver::{MassSolver, Way};
+use super::system::{Factor, Product, System};
 use crate::system::border::Border;
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
@@ -32,7 +34,8 @@ pub struct MassInverse<'a, const D: usize> {
     matrix: &'a BlockMatrix<1>,
     solver: &'a mut MassSolver,
     /// The preconditioner, unless the user has named another.
-    factor: Option<Incomplete>,
+    factor: Option<Factor>,
+    way: Way,
     rows: Border,
     /// Per owned degree of freedom: to be solved for.
     free: Vec<bool>,
@@ -67,13 +70,26 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         let diagonal: Vec<f64> = (0..owned)
             .map(|row| pattern.diagonal(row).map_or(0.0, |entry| matrix.values[entry]))
             .collect();
-        let free = (0..owned * D).map(|dof| !held[dof] && diagonal[dof / D] != 0.0).collect();
+        let free: Vec<bool> =
+            (0..owned * D).map(|dof| !held[dof] && diagonal[dof / D] != 0.0).collect();
         solver.forget(world)?;
         let rows = pattern.border(owned);
-        let factor = solver.of(world, 1)?.preconditions_by_ours().then(|| {
+        let ours = solver.of(world, 1, Way::Iterate)?.preconditions_by_ours();
+        let complete = (ours && world.size() == 1)
+            .then(|| Complete::factor(matrix, pattern, (&free, D)))
+            .flatten();
+        let way = match &complete {
+            Some(factor) if factor.is_sound() && solver.may_apply_once()? => Way::ApplyOnce,
+            _ => Way::Iterate,
+        };
+        let incomplete = || {
             let order = Order::new(grid, numbering, pattern, &rows);
             Incomplete::factor(world, order, matrix, numbering, pattern, &diagonal)
-        });
+        };
+        let factor = match complete {
+            Some(factor) => Some(Factor::Complete(factor)),
+            None => ours.then(|| Factor::Incomplete(incomplete())),
+        };
         let one_over = |value: &f64| if *value == 0.0 { 0.0 } else { 1.0 / value };
         let sums = matrix::row_sums(matrix, pattern, owned);
         let inverse_row_sum = sums.iter().map(one_over).collect();
@@ -85,6 +101,7 @@ impl<'a, const D: usize> MassInverse<'a, D> {
             matrix,
             solver,
             factor,
+            way,
             rows,
             free,
             inverse_row_sum,
@@ -160,6 +177,16 @@ impl<'a, const D: usize> MassInverse<'a, D> {
     ) -> Result<Vec<[f64; C]>> {
         let MassInverse { world, numbering, pattern, matrix, rows, solver, factor, .. } = self;
         let product = Product { world, numbering, pattern, matrix, rows };
+        if self.way == Way::ApplyOnce {
+            let mut x = vec![[0.0; C]; b.len()];
+            let mut system = System::new(product, factor.as_ref(), free);
+            let (right, left) = (b.as_flattened(), x.as_flattened_mut());
+            let solver = solver.of(world, sides, Way::ApplyOnce)?;
+            let outcome = solver.solve(world.comm(), &mut system, right, left)?;
+            self.iterations += outcome.iterations;
+            self.require(outcome)?;
+            return Ok(x);
+        }
         let mut x = vec![[0.0; C]; numbering.len()];
         match guess {
             Some(guess) => x[..b.len()].copy_from_slice(guess),
@@ -199,7 +226,8 @@ impl<'a, const D: usize> MassInverse<'a, D> {
         let mut found = vec![[0.0; C]; b.len()];
         let mut system = System::new(product, factor.as_ref(), free);
         let (right, left) = (r.as_flattened(), found.as_flattened_mut());
-        let outcome = solver.of(world, sides)?.solve(world.comm(), &mut system, right, left)?;
+        let solver = solver.of(world, sides, Way::Iterate)?;
+        let outcome = solver.solve(world.comm(), &mut system, right, left)?;
         self.iterations += outcome.iterations;
         self.require(outcome)?;
         for (x, found) in x.iter_mut().zip(&found) {

@@ -7,9 +7,11 @@
 //! | `light_nodes.rs` | nodes with hardly any mass, or less, move along with the points |
 //! | `inverse.rs` | M x = b for all components at once |
 //! | `solver.rs`, `system.rs` | PETSc's KSP for it; the product and the preconditioner that it calls |
-//! | `incomplete.rs`, `elimination.rs` | that preconditioner: Cholesky without fill, and its order |
+//! | `envelope.rs` | that preconditioner where the mass is small, on one rank: Cholesky with all fill |
+//! | `incomplete.rs`, `elimination.rs` | elsewhere: Cholesky without fill, and its order |
 
 pub(crate) mod elimination;
+pub(crate) mod envelope;
 pub(crate) mod grid_mass;
 pub(crate) mod incomplete;
 pub(crate) mod inverse;

@@ -15,37 +15,65 @@ const TOLERANCE_OF_OTHERS: &str = "1e-14";
 /// Iterations; the worst well-posed systems take a few hundred.
 const MOST_ITERATIONS: &str = "5000";
 
-/// The solvers of a run, made at the first solve: for one right-hand side, and for two side by side.
+/// How a mass is solved, unless the user says otherwise.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// The factor is complete: `preonly`.
+    ApplyOnce,
+    /// Conjugate gradients.
+    Iterate,
+}
+
+/// The solvers of a run, each made at its first solve.
 #[derive(Default)]
-pub struct MassSolver([Option<ShellKsp>; 2]);
+pub struct MassSolver {
+    /// By way, then for one right-hand side, and for two side by side.
+    made: [[Option<ShellKsp>; 2]; 2],
+    /// The user leaves method and norm to the program.
+    may_apply_once: Option<bool>,
+}
 
 impl MassSolver {
     /// The one for so many right-hand sides (1 or 2). Collective.
-    pub(super) fn of(&mut self, world: &World, sides: usize) -> Result<&mut ShellKsp> {
-        let slot = &mut self.0[sides - 1];
+    pub(super) fn of(&mut self, world: &World, sides: usize, way: Way) -> Result<&mut ShellKsp> {
+        let slot = &mut self.made[way as usize][sides - 1];
         Ok(match slot {
             Some(solver) => solver,
-            None => slot.insert(ShellKsp::new(petsc_solver(world, PREFIX, "shell")?)?),
+            None => slot.insert(ShellKsp::new(petsc_solver(world, PREFIX, "shell", way)?)?),
         })
+    }
+
+    /// Whether [`Way::ApplyOnce`] is the program's to choose.
+    pub(super) fn may_apply_once(&mut self) -> Result<bool> {
+        if let Some(may) = self.may_apply_once {
+            return Ok(may);
+        }
+        let users =
+            ["ksp_type", "ksp_norm_type"].map(|name| options::is_users(&format!("{PREFIX}{name}")));
+        let [method, norm] = users;
+        Ok(*self.may_apply_once.insert(!method? && !norm?))
     }
 
     /// Drops what belongs to the last matrix. Collective.
     pub(super) fn forget(&mut self, world: &World) -> Result<()> {
-        self.0.iter_mut().flatten().try_for_each(|solver| solver.forget(world.comm()))
+        let made = self.made.as_flattened_mut().iter_mut().flatten();
+        made.into_iter().try_for_each(|solver| solver.forget(world.comm()))
     }
 }
 
 /// A solver with the defaults of the mass; `preconditioner`: unless the user names one. Collective.
-pub fn petsc_solver(world: &World, prefix: &str, preconditioner: &str) -> Result<Ksp> {
+pub fn petsc_solver(world: &World, prefix: &str, preconditioner: &str, way: Way) -> Result<Ksp> {
     let mut ksp = Ksp::new(world.comm(), prefix)?;
+    ksp.set_defaults(&[("pc_type", preconditioner), ("ksp_max_it", MOST_ITERATIONS)])?;
+    if way == Way::ApplyOnce {
+        ksp.set_defaults(&[("ksp_type", "preonly"), ("ksp_norm_type", "none")])?;
+        ksp.set_from_options()?;
+        return Ok(ksp);
+    }
     let method = format!("{prefix}ksp_type");
     let cg = !options::is_users(&method)? || options::get(&method)?.as_deref() == Some("cg");
-    ksp.set_defaults(&[
-        ("ksp_type", "cg"),
-        ("pc_type", preconditioner),
-        ("ksp_max_it", MOST_ITERATIONS),
-        ("ksp_rtol", if cg { TOLERANCE } else { TOLERANCE_OF_OTHERS }),
-    ])?;
+    let tolerance = if cg { TOLERANCE } else { TOLERANCE_OF_OTHERS };
+    ksp.set_defaults(&[("ksp_type", "cg"), ("ksp_rtol", tolerance)])?;
     if cg {
         // Right-hand sides are scaled to one in this norm, which may rise before it falls.
         ksp.set_defaults(&[

@@ -1,6 +1,7 @@
 //! The mass as PETSc's KSP sees it: M ⊗ 1 over all components of all right-hand sides, a product and
 //! a preconditioner of the program's. One sweep over the scalar matrix serves `C` columns.
 
+use std::ffi::CStr;
 use std::ops::Range;
 
 use crate::error::Result;
@@ -11,6 +12,7 @@ use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockMatrix;
 
+use super::envelope::Complete;
 use super::incomplete::Incomplete;
 use super::matrix;
 
@@ -41,24 +43,28 @@ impl Product<'_> {
     }
 }
 
+/// The program's preconditioners.
+pub enum Factor {
+    /// Of a small matrix on one rank: its inverse.
+    Complete(Complete),
+    Incomplete(Incomplete),
+}
+
 /// The mass matrix for `C` columns. Some values are held at zero: their rows are those of the identity.
 pub struct System<'a, const C: usize> {
     product: Product<'a>,
     /// `None`: PETSc's preconditioner is used.
-    factor: Option<&'a Incomplete>,
+    factor: Option<&'a Factor>,
     /// Of owned nodes: to be solved for.
     free: &'a [[bool; C]],
-    /// Values at local nodes.
+    /// Values at local nodes, with room up to a multiple of eight.
     local: Vec<[f64; C]>,
 }
 
 impl<'a, const C: usize> System<'a, C> {
-    pub fn new(
-        product: Product<'a>,
-        factor: Option<&'a Incomplete>,
-        free: &'a [[bool; C]],
-    ) -> Self {
-        System { product, factor, free, local: vec![[0.0; C]; product.numbering.len()] }
+    pub fn new(product: Product<'a>, factor: Option<&'a Factor>, free: &'a [[bool; C]]) -> Self {
+        let room = product.numbering.len().next_multiple_of(8);
+        System { product, factor, free, local: vec![[0.0; C]; room] }
     }
 }
 
@@ -66,7 +72,7 @@ impl<const C: usize> ShellSystem for System<'_, C> {
     fn multiply(&mut self, x: &[f64], y: &mut [f64]) -> Result<()> {
         let (x, y) = (x.as_chunks::<C>().0, y.as_chunks_mut::<C>().0);
         self.local[..x.len()].copy_from_slice(x);
-        self.product.multiply(&mut self.local, y);
+        self.product.multiply(&mut self.local[..self.product.numbering.len()], y);
         for ((y, x), free) in y.iter_mut().zip(x).zip(self.free) {
             for k in 0..C {
                 y[k] = if free[k] { y[k] } else { x[k] };
@@ -77,14 +83,27 @@ impl<const C: usize> ShellSystem for System<'_, C> {
 
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let (r, z) = (r.as_chunks::<C>().0, z.as_chunks_mut::<C>().0);
-        let Some(factor) = self.factor else {
-            z.copy_from_slice(r);
-            return Ok(());
-        };
         let Product { world, numbering, .. } = self.product;
-        factor.apply(world, numbering, r, self.free, &mut self.local)?;
+        match self.factor {
+            None => self.local[..r.len()].copy_from_slice(r),
+            Some(Factor::Complete(factor)) => {
+                self.local[..r.len()].copy_from_slice(r);
+                factor.solve(&mut self.local);
+            }
+            Some(Factor::Incomplete(factor)) => {
+                let local = &mut self.local[..numbering.len()];
+                factor.apply(world, numbering, r, self.free, local)?;
+            }
+        }
         z.copy_from_slice(&self.local[..z.len()]);
         Ok(())
+    }
+
+    fn preconditioner(&self) -> &'static CStr {
+        match self.factor {
+            Some(Factor::Complete(_)) => c"complete factor",
+            _ => c"incomplete factor over all ranks",
+        }
     }
 
     fn entries(&self) -> Result<Matrix> {

@@ -1,7 +1,7 @@
 //! A x = b where A is a product and its preconditioner is ours: KSP over a shell matrix and a shell
 //! preconditioner, so that methods, monitors, views and logs are PETSc's.
 
-use std::ffi::c_void;
+use std::ffi::{CStr, c_void};
 use std::ptr::{null, null_mut};
 
 use mpi::topology::SimpleCommunicator;
@@ -16,7 +16,7 @@ use super::vector::{LocalValues, LocalValuesMut, Vector, index};
 use super::{Matrix, sys};
 use crate::error::Result;
 
-/// A symmetric positive definite system. Slices hold this rank's values. All functions are
+/// A symmetric positive definite system A x = b. Slices hold this rank's values. All functions but the name are
 /// collective.
 pub trait ShellSystem {
     /// y = A x.
@@ -24,6 +24,9 @@ pub trait ShellSystem {
 
     /// z = P^-1 r with P near A. Only called while the type of the preconditioner is `shell`.
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<()>;
+
+    /// What views call the preconditioner.
+    fn preconditioner(&self) -> &'static CStr;
 
     /// The entries of A, for preconditioners of PETSc's that need them.
     fn entries(&self) -> Result<Matrix>;
@@ -100,7 +103,7 @@ impl ShellKsp {
             petsc!(KSPGetPC(raw, &mut pc))?;
             petsc!(PCShellSetContext(pc, data))?;
             petsc!(PCShellSetApply(pc, Some(precondition::<S>)))?;
-            petsc!(PCShellSetName(pc, c"incomplete factor over all ranks".as_ptr()))?;
+            petsc!(PCShellSetName(pc, system.preconditioner().as_ptr()))?;
         }
         space.b.values_mut()?.copy_from_slice(b);
         petsc!(KSPSolve(raw, space.b.raw(), space.x.raw()))

@@ -95,6 +95,27 @@ fn the_mass_by_petsc_options() {
     }
 }
 
+/// On one rank a small mass has a complete factor: one application leaves round-off. PETSc's monitor acts on it.
+#[test]
+fn a_small_mass_takes_one_application() {
+    let told = contact(10).word("-mass_ksp_monitor").attempt();
+    assert_eq!(told.code, 0, "{}", told.stderr);
+    let norms: Vec<(usize, f64)> = told
+        .stdout
+        .lines()
+        .filter_map(|line| {
+            let (iteration, norm) = line.split_once(" KSP Residual norm ")?;
+            Some((iteration.trim().parse().ok()?, norm.trim().parse().ok()?))
+        })
+        .collect();
+    // Velocity and acceleration in each of ten steps.
+    assert_eq!(norms.len(), 2 * 20, "{norms:?}");
+    for pair in norms.chunks_exact(2) {
+        let [(0, before), (1, after)] = pair else { panic!("{pair:?}") };
+        assert!(*after <= 1e-12 * before, "{pair:?}");
+    }
+}
+
 #[test]
 fn collision_in_space() {
     let run = Run::of("ghost-collision-3d")
