@@ -239,5 +239,6 @@ fn coarse_nodes(
         halo,
         key: values.iter().copied().step_by(VALUES).collect(),
         position: values.chunks_exact(VALUES).map(|v| [v[1], v[2], v[3]]).collect(),
+        modes: fine.modes,
     })
 }

@@ -1,5 +1,6 @@
 //! What one level of multigrid is on one rank: its nodes, and the rows of its matrix in blocks.
 
+use super::rigid::Modes;
 use crate::parallel::HaloPlan;
 use crate::petsc::Index;
 use crate::system::numbering::Numbering;
@@ -19,6 +20,8 @@ pub struct Nodes {
     pub position: Vec<[f64; 3]>,
     /// Between 0 and 1, different for each node, and the same on any number of ranks.
     pub key: Vec<f64>,
+    /// What the values of each node are.
+    pub modes: Modes,
 }
 
 impl Nodes {

@@ -5,7 +5,7 @@
 //! |---|---|
 //! | which nodes move together | `strength.rs` |
 //! | groups of nodes that become one | `aggregate.rs` |
-//! | motions of a coarse node | `rigid.rs` |
+//! | smooth modes of a coarse node | `rigid.rs` |
 //! | largest eigenvalue, for damping and smoother | `spectrum.rs` |
 //! | transfer between levels | `prolongator.rs` |
 //! | whose nodes they are | `owners.rs` |
@@ -52,6 +52,7 @@ pub use cycle::{CoarsestRows, Hierarchy, Levelled, Levels, Smoothed};
 use aggregate::Aggregates;
 use galerkin::Coarse;
 use prolongator::{Lengths, Parts, Prolongator};
+use rigid::Modes;
 use strength::Strong;
 use tied::Ties;
 
@@ -77,9 +78,9 @@ struct Coarsening {
 const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
 const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
-/// The hierarchy under an assembled system of displacements, which may be `symmetric` or not;
-/// `ties`: what penalties do to it. `None` for `N` unknowns per node that are no displacements, whose
-/// smooth modes it does not know. Collective.
+/// The hierarchy under an assembled system, which may be `symmetric` or not; `ties`: what penalties do to it. `N`
+/// unknowns per node are displacements where space has as many axes; others are smooth where each is constant. `None`
+/// for one or more than three of these, of which there are no products by blocks. Collective.
 pub fn of_system<const D: usize, const N: usize>(
     world: &World,
     grid: &Grid<D>,
@@ -88,19 +89,25 @@ pub fn of_system<const D: usize, const N: usize>(
     ties: &Ties<N>,
     symmetric: bool,
 ) -> Result<Option<Hierarchy>> {
-    if N != D {
-        return Ok(None);
-    }
+    let modes = if N == D { Modes::RigidMotions } else { Modes::Constants };
     let nodes = Nodes {
         position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
         key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
+        modes,
         ..nodes_of(numbering)
     };
-    match (D, symmetric) {
-        (2, true) => build::<N, 3>(world, &nodes, rows, ties),
-        (2, false) => build_unsymmetric::<N, 3>(world, &nodes, rows, ties),
-        (_, true) => build::<N, 6>(world, &nodes, rows, ties),
-        (_, false) => build_unsymmetric::<N, 6>(world, &nodes, rows, ties),
+    match (modes, N, symmetric) {
+        (Modes::RigidMotions, 2, true) | (Modes::Constants, 3, true) => {
+            build::<N, 3>(world, &nodes, rows, ties)
+        }
+        (Modes::RigidMotions, 2, false) | (Modes::Constants, 3, false) => {
+            build_unsymmetric::<N, 3>(world, &nodes, rows, ties)
+        }
+        (Modes::RigidMotions, _, true) => build::<N, 6>(world, &nodes, rows, ties),
+        (Modes::RigidMotions, _, false) => build_unsymmetric::<N, 6>(world, &nodes, rows, ties),
+        (Modes::Constants, 2, true) => build::<N, 2>(world, &nodes, rows, ties),
+        (Modes::Constants, 2, false) => build_unsymmetric::<N, 2>(world, &nodes, rows, ties),
+        (Modes::Constants, ..) => Ok(None),
     }
 }
 

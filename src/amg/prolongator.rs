@@ -8,7 +8,7 @@ use crate::tensor::fused::{self, Block, add_product};
 
 use super::aggregate::{Aggregates, Group};
 use super::level::{Nodes, Rows};
-use super::rigid;
+use super::rigid::{self, Modes};
 use super::strength::Strong;
 
 /// Rows of the transfer from the coarse level: of the owned nodes, then of their ghosts.
@@ -65,7 +65,10 @@ impl Parts<'_> {
     ) -> Block<K, C> {
         let offset = offset(self.nodes.position[node], group.root);
         let ratio = self.lengths.fine / self.lengths.coarse;
-        let mut motion = rigid::carried(offset, self.lengths.coarse, ratio);
+        let mut motion = match self.nodes.modes {
+            Modes::RigidMotions => rigid::carried(offset, self.lengths.coarse, ratio),
+            Modes::Constants => rigid::constant(),
+        };
         for (line, free) in motion.iter_mut().zip(&free[node * K..]) {
             line.iter_mut().for_each(|value| *value *= free);
         }

@@ -1,8 +1,25 @@
-//! Motions of a coarse node: displacement of its root and rotation about it, the rigid-body modes
-//! that smoothed aggregation has to keep. A node of a coarser level has three degrees of freedom in
-//! the plane and six in space.
+//! What a coarse node does to the nodes of its group: the smooth modes that smoothed aggregation has to keep.
+//!
+//! Displacements have the rigid-body modes, displacement of the root and rotation about it: a node of a
+//! coarser level has three degrees of freedom in the plane and six in space. Other unknowns have constants, one
+//! degree of freedom each.
 
 use crate::tensor::fused::Block;
+
+/// What the values of a node are.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Modes {
+    /// Displacements, and on coarser levels rotations.
+    #[default]
+    RigidMotions,
+    /// Unknowns that are smooth where each is constant.
+    Constants,
+}
+
+/// Each value of the coarse node is that of all nodes of its group.
+pub fn constant<const K: usize, const C: usize>() -> Block<K, C> {
+    std::array::from_fn(|k| std::array::from_fn(|c| if k == c { 1.0 } else { 0.0 }))
+}
 
 /// What a motion of the coarse node does to a node at `offset` (m) from its root: u = t + w x r, with
 /// rotations in units of one over `length`. `ratio`: that length of the finer level over this one's,

@@ -178,6 +178,7 @@ impl<const D: usize> Block<D> {
             key: global.iter().map(key).collect(),
             global,
             halo: halo.unwrap(),
+            ..Nodes::default()
         };
         Share { nodes, rows }
     }
