@@ -4,6 +4,7 @@ use std::path::Path;
 
 use mpm_par::deck::model::*;
 use mpm_par::deck::{self, Deck, Scope};
+use mpm_par::loads::Point;
 
 const BEAM: &str = include_str!("decks/beam.toml");
 const DYNAMIC: &str = include_str!("decks/collision.toml");
@@ -32,7 +33,7 @@ fn beam_becomes_a_deck() {
     assert_eq!(deck.boundaries[0].place, Place::Side { axis: 0, upper: false });
     assert_eq!(deck.boundaries[0].fix, [0]);
     assert_eq!(deck.boundaries[1].name, "boundary-2");
-    let Load::Point { nearest, force, .. } = &deck.loads[0] else { panic!("a point load") };
+    let Load::Point(Point { nearest, force, .. }) = &deck.loads[0] else { panic!("a point load") };
     let force: Vec<_> = force.iter().map(|f| f.as_constant()).collect();
     assert_eq!((nearest.len(), force), (2, vec![Some(0.0), Some(-100e3)]));
     assert_eq!(deck.output.every, Every::Steps(5));

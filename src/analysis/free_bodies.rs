@@ -87,7 +87,7 @@ pub(crate) fn gravity<const D: usize>(
     let mut sum = [0.0; D];
     for load in &model.deck.loads {
         if let Load::Gravity(all) = load {
-            for (sum, value) in sum.iter_mut().zip(all) {
+            for (sum, value) in sum.iter_mut().zip(&all.0) {
                 *sum += at.factor_of(value) * value.value(&scope);
             }
         }

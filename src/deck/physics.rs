@@ -8,7 +8,7 @@
 
 use super::expression::{Expression, Variable};
 use super::model::{
-    AnalysisType, BodySource, Deck, Every, Grid, Load, MeshSource, OnFailure, Output, RigidShape,
+    AnalysisType, BodySource, Deck, Every, Grid, MeshSource, OnFailure, Output, RigidShape,
 };
 use super::resolved::resolved;
 use super::stage::Presence;
@@ -146,15 +146,7 @@ fn may_be_extended(deck: &Deck) -> bool {
         .boundaries
         .iter()
         .any(|boundary| boundary.rotation.is_some() || boundary.displacement.iter().any(total));
-    let load_totals = deck.loads.iter().any(|load| match load {
-        Load::Water(_) => false,
-        Load::Pressure { value, .. } | Load::SurfacePressure { value, .. } => of_factor(value),
-        Load::Point { force: all, .. }
-        | Load::Gravity(all)
-        | Load::Traction { value: all, .. }
-        | Load::BodyForce(all)
-        | Load::Manufactured(all) => all.iter().any(of_factor),
-    });
+    let load_totals = deck.loads.iter().any(|load| load.formulas().into_iter().any(of_factor));
     let rigid_totals = deck.rigids.iter().any(|rigid| {
         let total = |value: &Expression| of_factor(value) || !value.depends_on_time();
         let motion = &rigid.motion;

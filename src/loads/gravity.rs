@@ -1,13 +1,53 @@
 //! f_p = m_p g (Lagrangian eq. 24): gravity on the constant mass of the points.
 
-use super::{Load, Moment, scope_of};
+use super::declaration::{Around, Declaration, expressions};
+use super::{Load, Moment, Start, scope_of};
 use crate::deck::expression::{Expression, Variable};
+use crate::deck::model::Body;
+use crate::deck::schema::{Key, Kind, Need, key};
+use crate::deck::{Got, Table, toml_text};
 use crate::error::Result;
 use crate::material::Material;
 use crate::points::Points;
 
 /// m/s2, one expression of X, Y, Z, s, t per axis.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Gravity(pub Vec<Expression>);
+
+impl Declaration for Gravity {
+    const KEY: Key =
+        key("gravity", Kind::Expressions("X Y Z s t"), Need::Optional("-"), "Acceleration.")
+            .unit("m/s2");
+
+    fn read(table: &Table<'_>, around: &Around<'_>) -> Got<Self> {
+        let gravity = expressions(table, "gravity", around.dimension)?;
+        let acts = gravity.iter().any(|g| g.as_constant() != Some(0.0));
+        let Some(bodies) = around.bodies.filter(|_| acts) else { return Ok(Gravity(gravity)) };
+        if bodies.iter().all(|body| body.density == 0.0) {
+            return Err(table.problem("gravity", "acts on nothing: every body has density 0"));
+        }
+        let given = around.root.given_in_each("body", "density");
+        if let Some(light) = given.iter().position(|given| !given) {
+            let name = &bodies[light].name;
+            let what = format!("body \"{name}\" has no density, and others have one");
+            let help = "give it a density; density = 0.0 says that it is to be weightless";
+            return Err(table.problem_with_help("gravity", what, help));
+        }
+        Ok(Gravity(gravity))
+    }
+
+    fn written(&self, _bodies: &[Body]) -> String {
+        toml_text::expressions(&self.0)
+    }
+
+    fn formulas(&self) -> Vec<&Expression> {
+        self.0.iter().collect()
+    }
+
+    fn make<const D: usize>(&self, _start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {
+        Ok(Box::new(self.clone()))
+    }
+}
 
 impl<const D: usize> Load<D> for Gravity {
     fn add_to_points(

@@ -7,14 +7,43 @@
 
 use nalgebra::Matrix3;
 
-use super::{Load, Moment, scope_of};
-use crate::deck::Scope;
+use super::declaration::{Around, Declaration, expressions};
+use super::{Load, Moment, Start, scope_of};
 use crate::deck::expression::{Expression, Jet, Smooth};
-use crate::deck::model::Frame;
+use crate::deck::model::{Body, Frame};
+use crate::deck::schema::{Key, Kind, Need, key};
+use crate::deck::{Got, Scope, Table, toml_text};
 use crate::error::{Error, Result};
 use crate::material::{LocalMaterial, Material, local};
 use crate::mechanics::{self, StepStart};
 use crate::points::Points;
+
+/// A displacement field as the deck has it: m, one expression of X, Y, Z, s per axis.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MadeField(pub Vec<Expression>);
+
+impl Declaration for MadeField {
+    const KEY: Key = {
+        let doc = "The body force that makes this displacement field exact.";
+        key("manufactured", Kind::Expressions("X Y Z s"), Need::Optional("-"), doc).unit("m")
+    };
+
+    fn read(table: &Table<'_>, around: &Around<'_>) -> Got<Self> {
+        expressions(table, "manufactured", around.dimension).map(MadeField)
+    }
+
+    fn written(&self, _bodies: &[Body]) -> String {
+        toml_text::expressions(&self.0)
+    }
+
+    fn formulas(&self) -> Vec<&Expression> {
+        self.0.iter().collect()
+    }
+
+    fn make<const D: usize>(&self, _start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {
+        Ok(Box::new(Manufactured::new(&self.0)?))
+    }
+}
 
 /// A displacement field of X and s (or t) with its derivatives.
 #[derive(Debug, Clone)]

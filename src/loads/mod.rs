@@ -11,32 +11,50 @@
 //! | `[water]` | [`Water`](model::Water) | `water.rs` | formulations.md B.7 |
 //! | `manufactured` | [`Manufactured`] | `manufactured.rs` | Lagrangian §7.4 |
 //!
-//! A new load is one file that implements [`Load`] and one line of [`of_deck`].
+//! A new load is one file that implements [`Declaration`] for what the deck says and [`Load`] for the force, and its
+//! name in the list `loads!` below.
 
 mod body_force;
+mod declaration;
 mod gravity;
 pub(crate) mod manufactured;
 mod point;
+mod pressing;
 pub(crate) mod pressure;
 mod surface_pressure;
 mod traction;
 mod water;
+#[cfg(test)]
+#[path = "../../tests/adding/wind.rs"]
+mod wind;
 
 pub use body_force::BodyForce;
+pub use declaration::{Around, Declaration, expressions};
 pub use gravity::Gravity;
-pub use manufactured::Manufactured;
-pub use point::{Carriers, PointForce};
-pub use pressure::Pressure;
+pub use manufactured::{MadeField, Manufactured};
+pub use point::{Carriers, Point, PointForce};
+pub use pressing::Pressing;
+pub use pressure::{Pressure, PressureZone};
 pub use surface_pressure::SurfacePressure;
-pub use traction::Traction;
+pub use traction::{Traction, TractionOn};
 
 use crate::deck::expression::Expression;
-use crate::deck::model::{self, AnalysisType};
-use crate::deck::{Deck, Presence, Scope, When};
+use crate::deck::model::{self, AnalysisType, Body, BodySurface, Water};
+use crate::deck::schema::{Key, Section};
+use crate::deck::{Deck, Got, Presence, Scope, Table, When};
 use crate::error::{Error, Result};
 use crate::material::Material;
+use crate::parallel::World;
 use crate::points::Points;
 use crate::surface::Surface;
+#[cfg(test)]
+use wind::Wind;
+
+declaration::loads! {
+    Point, Gravity, BodyForce, Pressing, TractionOn, MadeField,
+    // The example of docs/develop/adding-a-load.md.
+    #[cfg(test)] Wind,
+}
 
 /// The moment at which loads are asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -82,14 +100,16 @@ impl Moment {
 
 /// An external load.
 pub trait Load<const D: usize> {
-    /// Adds the force on each point, N, to `forces`. Error: it has none there.
+    /// Adds the force on each point, N, to `forces`. Error: it has none there. A load that acts on nodes adds nothing.
     fn add_to_points(
         &self,
-        points: &Points<D>,
-        materials: &[Material],
-        at: Moment,
-        forces: &mut [[f64; D]],
-    ) -> Result<()>;
+        _points: &Points<D>,
+        _materials: &[Material],
+        _at: Moment,
+        _forces: &mut [[f64; D]],
+    ) -> Result<()> {
+        Ok(())
+    }
 
     /// The pressure on the surface, for a load that is one: it acts on the nodes and follows the
     /// motion within a step.
@@ -137,34 +157,16 @@ pub struct Found<const D: usize> {
     pub surface: Surface<D>,
 }
 
-/// What the deck asks for, in its order, with what was `found` of each;
-/// `cell`: size of the grid's cells, m.
-/// Error: a formula cannot serve.
-pub fn of_deck<const D: usize>(
-    loads: &[model::Load],
-    found: Vec<Found<D>>,
-    cell: f64,
-) -> Result<Vec<Box<dyn Load<D>>>> {
-    let made = loads.iter().zip(found).map(|(load, found)| -> Result<Box<dyn Load<D>>> {
-        Ok(match load {
-            model::Load::Point { force, .. } => Box::new(PointForce::new(force, &found.carriers)),
-            model::Load::Gravity(gravity) => Box::new(Gravity(gravity.clone())),
-            model::Load::BodyForce(force) => Box::new(BodyForce(force.clone())),
-            model::Load::Traction { value, .. } => {
-                Box::new(Traction { surface: found.surface, value: value.clone() })
-            }
-            model::Load::SurfacePressure { value, .. } => Box::new(SurfacePressure {
-                surface: found.surface,
-                pressure: Pressure::new(value, None, cell)?,
-            }),
-            model::Load::Pressure { value, zone } => {
-                Box::new(Pressure::new(value, zone.as_ref(), cell)?)
-            }
-            model::Load::Manufactured(field) => Box::new(Manufactured::new(field)?),
-            model::Load::Water(water) => Box::new(*water),
-        })
-    });
-    made.collect()
+/// What a load may need to begin with.
+pub struct Start<'a, const D: usize> {
+    /// The ranks.
+    pub world: &'a World,
+    /// This rank's points.
+    pub points: &'a Points<D>,
+    /// Points and surfaces that the deck names.
+    pub found: Found<D>,
+    /// Size of the grid's cells, m.
+    pub cell: f64,
 }
 
 /// What bodies take of a load with this presence while they come and go, by their index: a body that
@@ -231,4 +233,68 @@ pub fn scope_of<const D: usize>(
     scope.initial[..D].copy_from_slice(&points.position_initial[p]);
     scope.current[..D].copy_from_slice(&points.position[p]);
     scope
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use crate::deck;
+
+    const DECK: &str = r#"
+[analysis]
+type = "quasi-static"
+steps = 2
+
+[method]
+basis = "gimp"
+
+[grid]
+type = "lattice"
+origin = [0.0, 0.0]
+size = [4.0, 4.0]
+h = 1.0
+
+[material.steel]
+model = "hencky"
+young = 1e9
+poisson = 0.2
+
+[[body]]
+material = "steel"
+shape = { box = { min = [1, 0], max = [2, 3] } }
+
+[[boundary]]
+where = { side = "bottom" }
+fix = ["x", "y"]
+
+[[load]]
+"#;
+
+    fn read(load: &str) -> crate::error::Result<deck::Deck> {
+        deck::read(Path::new("deck.toml"), &format!("{DECK}{load}\n"), &[])
+    }
+
+    /// The example of the guide is a file and its name in the list: the deck knows it by that.
+    #[test]
+    fn a_load_is_a_file_and_a_line() {
+        let wind = "wind = { side = 1.0, area = 3.0, speed = \"30*s\", coefficient = 0.8 }";
+        let deck = read(wind).expect("a load");
+        assert!(deck.loads[0].depends_on_time());
+        let text = deck::resolved(&deck);
+        let expected = "wind = { side = 1.0, area = 3.0, density = 1.25, speed = \"30*s\", \
+                        exponent = 0.2, coefficient = 0.8 }";
+        assert!(text.contains(expected), "{text}");
+        assert_eq!(deck::read(Path::new("again"), &text, &[]).expect("again").loads, deck.loads);
+        for (load, words) in [
+            ("wind = { side = 1.0, area = 3.0, coefficient = 0.8 }", "load.0.wind.speed"),
+            ("wind = { side = 1.0, area = -3.0, speed = 1, coefficient = 0.8 }", "wind.area"),
+            ("wind = { side = 1.0, aera = 3.0, speed = 1, coefficient = 0.8 }", "\"area\""),
+            ("wimd = { side = 1.0 }", "did you mean \"wind\"?"),
+        ] {
+            let told = read(load).expect_err(load).to_string();
+            assert!(told.contains(words), "{told}");
+        }
+        assert!(deck::json_schema::json_schema().to_string().contains("\"wind\""));
+    }
 }

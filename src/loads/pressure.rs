@@ -14,13 +14,21 @@
 use super::{Load, Moment};
 use crate::deck::Scope;
 use crate::deck::expression::{Expression, Smooth, jet::Jet};
-use crate::deck::model::PressureZone;
 use crate::error::{Error, Result};
-use crate::material::Material;
-use crate::points::Points;
 
 /// Cells over which a pressure fades outside its zone where the deck says nothing.
 const FADE_CELLS: f64 = 3.0;
+
+/// Where a pressure acts in full, in current positions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PressureZone {
+    /// m
+    pub min: Vec<f64>,
+    /// m
+    pub max: Vec<f64>,
+    /// Width over which it falls to zero outside, m; `None`: three cells.
+    pub fade: Option<f64>,
+}
 
 /// A pressure on the surface of all bodies.
 pub struct Pressure {
@@ -119,17 +127,6 @@ fn fading(x: Jet, min: f64, max: f64, fade: f64) -> Jet {
 }
 
 impl<const D: usize> Load<D> for Pressure {
-    /// It acts on nodes, not on points.
-    fn add_to_points(
-        &self,
-        _points: &Points<D>,
-        _materials: &[Material],
-        _at: Moment,
-        _forces: &mut [[f64; D]],
-    ) -> Result<()> {
-        Ok(())
-    }
-
     fn pressure(&self) -> Option<&Pressure> {
         Some(self)
     }

@@ -3,10 +3,7 @@
 //! [`super::pressure`].
 
 use super::pressure::Pressure;
-use super::{Load, Moment, OnSurface};
-use crate::error::Result;
-use crate::material::Material;
-use crate::points::Points;
+use super::{Load, OnSurface};
 use crate::surface::Surface;
 
 /// A pressure and the surface that it acts on.
@@ -18,17 +15,6 @@ pub struct SurfacePressure<const D: usize> {
 }
 
 impl<const D: usize> Load<D> for SurfacePressure<D> {
-    /// It acts on nodes, not on points.
-    fn add_to_points(
-        &self,
-        _points: &Points<D>,
-        _materials: &[Material],
-        _at: Moment,
-        _forces: &mut [[f64; D]],
-    ) -> Result<()> {
-        Ok(())
-    }
-
     fn on_surface(&self) -> Option<OnSurface<'_, D>> {
         Some(OnSurface::Pressure { surface: &self.surface, pressure: &self.pressure })
     }

@@ -1,12 +1,74 @@
 //! t(X, s, t) A: a dead traction per initial area on a body's surface (formulations.md B.6 (b)). It
 //! acts at the surface's elements ([`crate::surface`]): `system/terms/surface.rs` hands it to the nodes.
 
-use super::{Load, Moment, OnSurface};
+use super::declaration::{Around, Declaration, expressions};
+use super::{Load, OnSurface, Start};
 use crate::deck::expression::Expression;
+use crate::deck::model::{Body, BodySurface};
+use crate::deck::schema::{Key, Kind, Need, OF_BODY, Section, key};
+use crate::deck::{Got, Table, body_surface, toml_text};
 use crate::error::Result;
-use crate::material::Material;
-use crate::points::Points;
 use crate::surface::Surface;
+
+/// A traction as the deck has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TractionOn {
+    /// Where it acts.
+    pub surface: BodySurface,
+    /// Pa per initial area, expressions of X, Y, Z, s, t.
+    pub value: Vec<Expression>,
+}
+
+impl Declaration for TractionOn {
+    const KEY: Key = {
+        let doc = "Dead load per initial area on a body's surface.";
+        key("traction", Kind::Table("load.traction"), Need::Optional("-"), doc)
+    };
+
+    const SECTIONS: &'static [Section] = &[Section {
+        name: "load.traction",
+        header: "load.traction",
+        doc: "Keeps its direction and its total, whatever the body does. It acts on the body's own surface: at places of its shape, which the points beside them carry along.",
+        keys: &[
+            OF_BODY[0],
+            OF_BODY[1],
+            OF_BODY[2],
+            key("value", Kind::Expressions("X Y Z s t"), Need::Required, "Force per initial area.")
+                .unit("Pa"),
+        ],
+    }];
+
+    fn read(table: &Table<'_>, around: &Around<'_>) -> Got<Self> {
+        let Around { dimension, names, bodies, .. } = *around;
+        table.table("traction", |t| {
+            let surface = body_surface(&t, dimension, names, bodies);
+            let value = expressions(&t, "value", dimension)?;
+            Ok(TractionOn { surface: surface?, value })
+        })
+    }
+
+    fn written(&self, bodies: &[Body]) -> String {
+        let mut pairs = toml_text::body_surface(bodies, &self.surface);
+        pairs.push(("value", toml_text::expressions(&self.value)));
+        toml_text::inline(&pairs)
+    }
+
+    fn formulas(&self) -> Vec<&Expression> {
+        self.value.iter().collect()
+    }
+
+    fn body(&self) -> Option<usize> {
+        Some(self.surface.body)
+    }
+
+    fn surface(&self) -> Option<(&BodySurface, &'static str)> {
+        Some((&self.surface, "traction"))
+    }
+
+    fn make<const D: usize>(&self, start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {
+        Ok(Box::new(Traction { surface: start.found.surface, value: self.value.clone() }))
+    }
+}
 
 /// A traction and the surface that it acts on.
 pub struct Traction<const D: usize> {
@@ -17,17 +79,6 @@ pub struct Traction<const D: usize> {
 }
 
 impl<const D: usize> Load<D> for Traction<D> {
-    /// It acts on nodes, not on points.
-    fn add_to_points(
-        &self,
-        _points: &Points<D>,
-        _materials: &[Material],
-        _at: Moment,
-        _forces: &mut [[f64; D]],
-    ) -> Result<()> {
-        Ok(())
-    }
-
     fn on_surface(&self) -> Option<OnSurface<'_, D>> {
         Some(OnSurface::Traction { surface: &self.surface, value: &self.value })
     }

@@ -37,7 +37,7 @@ fn gravity<const D: usize>(deck: &Deck) -> [f64; D] {
     let mut gravity = [0.0; D];
     for load in &deck.loads {
         if let Load::Gravity(g) = load {
-            gravity.iter_mut().zip(g).for_each(|(sum, g)| *sum += g.value(&at.scope()));
+            gravity.iter_mut().zip(&g.0).for_each(|(sum, g)| *sum += g.value(&at.scope()));
         }
     }
     gravity

@@ -11,7 +11,7 @@ use crate::deck::{Deck, Presence};
 use crate::error::{Error, Result};
 use crate::ghost::stencil::Penalty;
 use crate::grid::{Grid, Lattice, Mesh};
-use crate::loads::{self, Found, Manufactured};
+use crate::loads::{Found, Manufactured, Point, Start};
 use crate::material::Material;
 use crate::output::restart::checkpoint::Restored;
 use crate::parallel::nearest::require_near;
@@ -184,11 +184,16 @@ fn model_of<const D: usize>(
         })
         .collect();
     let field = deck.loads.iter().find_map(|load| match load {
-        Load::Manufactured(field) => Some(field),
+        Load::MadeField(field) => Some(&field.0),
         _ => None,
     });
     let manufactured = field.map(|field| Manufactured::new(field)).transpose()?;
-    let loads = loads::of_deck(&deck.loads, found, grid.cell_size())?;
+    let loads = deck
+        .loads
+        .iter()
+        .zip(found)
+        .map(|(load, found)| load.make(Start { world, points, found, cell: grid.cell_size() }));
+    let loads = loads.collect::<Result<Vec<_>>>()?;
     let supports = surfaces::supports(world, &deck, points, grid.cell_size())?;
     let contacts =
         Arc::new(Contacts::of_deck(&deck, &stiffness, (grid.cell_size(), grid.node_count()))?);
@@ -307,14 +312,11 @@ fn find_carriers<const D: usize>(
 ) -> Result<Vec<Found<D>>> {
     let mut all = vec![Found::default(); deck.loads.len()];
     for (index, load) in deck.loads.iter().enumerate() {
-        if let Load::Traction { surface, .. } | Load::SurfacePressure { surface, .. } = load {
-            let key = match load {
-                Load::Traction { .. } => format!("load.{index}.traction"),
-                _ => format!("load.{index}.pressure.surface"),
-            };
+        if let Some((surface, key)) = load.surface() {
+            let key = format!("load.{index}.{key}");
             all[index].surface = surfaces::of_body(world, deck, points, surface, &key)?;
         }
-        let Load::Point { body, nearest, .. } = load else { continue };
+        let Load::Point(Point { body, nearest, .. }) = load else { continue };
         for place in nearest {
             let of = Some((*body, deck.bodies[*body].name.as_str()));
             let id = require_near(world, grid, points, of, place).map_err(|why| {
@@ -334,7 +336,7 @@ fn hold_constant_forces<const D: usize>(
     points: &mut Points<D>,
 ) {
     for ((load, presence), found) in deck.loads.iter().zip(&deck.load_presence).zip(found) {
-        let Load::Point { nearest, force, .. } = load else { continue };
+        let Load::Point(Point { nearest, force, .. }) = load else { continue };
         let passes = deck.is_staged() || *presence != Presence::default();
         if passes || force.iter().any(Expression::depends_on_time) {
             continue;

@@ -17,15 +17,16 @@ use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations}
 use mpm_par::analysis::solver::{self, Linear, Shape};
 use mpm_par::basis::contract::Basis;
 use mpm_par::basis::of_deck;
-use mpm_par::deck;
-use mpm_par::deck::When;
+use mpm_par::deck::expression::Expression;
 use mpm_par::deck::model::{self, AnalysisType, Frame, GimpEdge, InvertedIterates};
+use mpm_par::deck::{self, When};
+use mpm_par::error;
 use mpm_par::grid::{Grid, Lattice};
-use mpm_par::loads::{self, Load};
-use mpm_par::material::Model as _;
+use mpm_par::loads::{self, Declaration, Found, Start};
+use mpm_par::material::{self, Model as _};
 use mpm_par::parallel::World;
 use mpm_par::petsc::Session;
-use mpm_par::points::Points;
+use mpm_par::points::{self, Points};
 use mpm_par::run::setup;
 use mpm_par::system::conditions::Conditions;
 use mpm_par::system::model::Model;
@@ -314,17 +315,16 @@ fn blow(universe: &Universe) {
     let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
     let world = World::new(universe.world().duplicate());
     let (model, points) = block(&world);
-    let volume = volume_at(&world, 0, &points);
     let wind = Wind {
         side: 0.0,
         area: LENGTHS[0],
-        volume,
         density: 1.25,
-        speed: 25.0,
+        speed: Expression::parse("25").expect("valid"),
         exponent: 0.5,
         coefficient: 0.8,
     };
-    let all: Vec<Box<dyn Load<2>>> = vec![Box::new(wind)];
+    let start = Start { world: &world, points: &points, found: Found::default(), cell: 1.0 };
+    let all = vec![wind.make(start).expect("a load")];
     let when = When { stage: 0, factor: 0.5, time: 0.5 };
     // Half of the load at half of the steps.
     let mut deck = model.deck.clone();

@@ -89,11 +89,12 @@ impl<'a> Table<'a> {
         self.section.keys.iter().map(|key| key.name)
     }
 
+    /// Whether the deck gives the key.
     pub fn given(&self, key: &str) -> bool {
         self.node(key).is_some()
     }
 
-    pub fn problems(&self) -> &'a Problems {
+    pub(crate) fn problems(&self) -> &'a Problems {
         self.problems
     }
 
@@ -107,6 +108,7 @@ impl<'a> Table<'a> {
         self.problem_with_help(key, message, "")
     }
 
+    /// [`Self::problem`] with a line on what would be right.
     pub fn problem_with_help(
         &self,
         key: &str,

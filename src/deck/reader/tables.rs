@@ -3,7 +3,7 @@
 use super::Table;
 use crate::deck::problems::Got;
 use crate::deck::schema::{self, Kind, Need};
-use crate::deck::tree::Value;
+use crate::deck::tree::{Entry, Node, Value};
 
 impl Table<'_> {
     /// Runs `read` on a sub-table; `None` if it is absent (and required keys are reported).
@@ -76,6 +76,36 @@ impl Table<'_> {
             })
             .collect();
         all.into_iter().collect()
+    }
+
+    /// `of` each table of an array of tables, as written and whether or not it is right; nothing of another value.
+    fn in_each<T>(&self, tables: &str, of: impl Fn(&[Entry]) -> T) -> Vec<T> {
+        let Some(Value::Array(items)) = self.node(tables).map(|node| &node.value) else {
+            return Vec::new();
+        };
+        let entries = |item: &Node| match &item.value {
+            Value::Table(entries) => of(entries),
+            _ => of(&[]),
+        };
+        items.iter().map(entries).collect()
+    }
+
+    /// Whether each table of an array of tables gives the key.
+    pub fn given_in_each(&self, tables: &str, key: &str) -> Vec<bool> {
+        self.in_each(tables, |entries| entries.iter().any(|entry| entry.key == key))
+    }
+
+    /// Names of an array of tables, so that other sections can refer to faulty ones; those without one are numbered.
+    pub fn names_of(&self, tables: &str) -> Vec<String> {
+        let given = self.in_each(tables, |entries| {
+            let name = entries.iter().find(|entry| entry.key == "name")?;
+            match &name.node.value {
+                Value::String(name) => Some(name.clone()),
+                _ => None,
+            }
+        });
+        let named = given.into_iter().enumerate();
+        named.map(|(k, name)| name.unwrap_or_else(|| format!("{tables}-{}", k + 1))).collect()
     }
 
     /// Runs `read` on each named table below a key.

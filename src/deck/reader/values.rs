@@ -54,22 +54,27 @@ impl Table<'_> {
         Err(self.problems.report(&node.origin, &self.full(key.name), message, String::new()))
     }
 
+    /// A number, if the key is given or has a default.
     pub fn number_if(&self, name: &str) -> Got<Option<f64>> {
         self.read(name, |key, node| self.number_in(key, node))
     }
 
+    /// A number; missing is a problem.
     pub fn number(&self, name: &str) -> Got<f64> {
         self.present(name, self.number_if(name))
     }
 
+    /// A whole number, if the key is given or has a default.
     pub fn count_if(&self, name: &str) -> Got<Option<usize>> {
         self.read(name, |key, node| self.count_in(key, node))
     }
 
+    /// A whole number; missing is a problem.
     pub fn count(&self, name: &str) -> Got<usize> {
         self.present(name, self.count_if(name))
     }
 
+    /// true or false, if the key is given or has a default.
     pub fn flag_if(&self, name: &str) -> Got<Option<bool>> {
         self.read(name, |key, node| match node.value {
             Value::Boolean(value) => Ok(value),
@@ -77,6 +82,7 @@ impl Table<'_> {
         })
     }
 
+    /// A string, if the key is given or has a default.
     pub fn text_if(&self, name: &str) -> Got<Option<String>> {
         let text = self.read(name, |key, node| self.text_in(key, node))?;
         // Names go into headers of tables and into messages, which have one line.
@@ -87,6 +93,7 @@ impl Table<'_> {
         Ok(text)
     }
 
+    /// A string; missing is a problem.
     pub fn text(&self, name: &str) -> Got<String> {
         self.present(name, self.text_if(name))
     }
@@ -99,10 +106,12 @@ impl Table<'_> {
         }
     }
 
+    /// One number per axis, if the key is given.
     pub fn vector_if(&self, name: &str, dimension: usize) -> Got<Option<Vec<f64>>> {
         self.read(name, |key, node| self.vector_in(key, node, dimension))
     }
 
+    /// One number per axis; missing is a problem.
     pub fn vector(&self, name: &str, dimension: usize) -> Got<Vec<f64>> {
         self.present(name, self.vector_if(name, dimension))
     }

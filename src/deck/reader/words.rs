@@ -41,6 +41,7 @@ impl Table<'_> {
         self.present(name, self.choice_if(name))
     }
 
+    /// [`Self::choice`], if the key is given or has a default.
     pub fn choice_if<T: Choice>(&self, name: &str) -> Got<Option<T>> {
         self.read(name, |key, node| {
             let text = self.text_in(key, node)?;
@@ -113,6 +114,7 @@ impl Table<'_> {
         }
     }
 
+    /// A formula in the variables of the schema, if the key is given.
     pub fn expression_if(&self, name: &str) -> Got<Option<Expression>> {
         self.read(name, |key, node| self.expression_in(key, node, Self::variables(key)))
     }
@@ -141,6 +143,7 @@ impl Table<'_> {
         )
     }
 
+    /// One formula per axis, if the key is given.
     pub fn expressions_if(&self, name: &str, dimension: usize) -> Got<Option<Vec<Expression>>> {
         self.read(name, |key, node| {
             let variables = Self::variables(key);

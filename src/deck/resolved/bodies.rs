@@ -5,9 +5,8 @@ use crate::deck::schema::AXES;
 use crate::deck::shape::{Form, Shape};
 
 use super::problem::presence;
-use super::writer::{
-    Writer, array, counts, expression, expressions, inline, number, quote, vector,
-};
+use super::toml_text::{array, counts, expression, expressions, inline, number, quote, vector};
+use super::writer::Writer;
 
 pub(super) fn materials_and_bodies(w: &mut Writer<'_>, deck: &Deck) {
     for material in &deck.materials {

@@ -3,7 +3,8 @@
 use crate::deck::model::{AnalysisType, Deck, Friction, Partner, RigidMotion, RigidShape};
 
 use super::problem::presence;
-use super::writer::{Writer, array, expression, expressions, inline, number, quote, vector};
+use super::toml_text::{array, expression, expressions, inline, number, quote, vector};
+use super::writer::Writer;
 
 pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
     for rigid in &deck.rigids {

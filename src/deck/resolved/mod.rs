@@ -7,17 +7,20 @@
 //! | `boundary`, `water`, `load` | `conditions.rs` |
 //! | `rigid`, `contact` | `contact.rs` |
 //! | `verify`, `probe`, `output`, `parallel`, `petsc` | `results.rs` |
-//! | (keys and values) | `writer.rs` |
+//! | (tables and keys) | `writer.rs` |
+//! | (values) | `toml_text.rs` |
 
 mod bodies;
 mod conditions;
 mod contact;
 mod problem;
 mod results;
+pub mod toml_text;
 mod writer;
 
 use super::model::Deck;
-use writer::{Writer, quote};
+use toml_text::quote;
+use writer::Writer;
 
 /// TOML of `deck` with all defaults. Relative paths have become absolute ones.
 pub fn resolved(deck: &Deck) -> String {

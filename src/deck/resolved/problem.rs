@@ -3,7 +3,8 @@
 use crate::deck::model::{Deck, ElementTest, Grid, MeshMotion, MeshSource};
 use crate::deck::stage::Presence;
 
-use super::writer::{Writer, array, axes, counts, inline, number, quote, vector};
+use super::toml_text::{array, axes, counts, inline, number, quote, vector};
+use super::writer::Writer;
 
 pub(super) fn analysis(w: &mut Writer<'_>, deck: &Deck) {
     let a = &deck.analysis;

@@ -2,7 +2,8 @@
 
 use crate::deck::model::{Deck, Every, Spot};
 
-use super::writer::{Writer, array, expression, expressions, inline, number, quote, vector};
+use super::toml_text::{array, expression, expressions, inline, number, quote, vector};
+use super::writer::Writer;
 
 pub(super) fn results(w: &mut Writer<'_>, deck: &Deck) {
     for verify in &deck.verify {

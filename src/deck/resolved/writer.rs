@@ -1,8 +1,7 @@
-//! Keys and values as TOML spells them.
+//! Tables and keys of the resolved deck.
 
-use crate::deck::expression::Expression;
 use crate::deck::model::Deck;
-use crate::deck::schema::{self, AXES};
+use crate::deck::schema;
 use crate::deck::unread::is_read;
 
 /// The text so far.
@@ -32,55 +31,4 @@ impl Writer<'_> {
             self.line(section, key, value);
         }
     }
-}
-
-pub(super) fn quote(text: &str) -> String {
-    let mut out = String::from("\"");
-    for c in text.chars() {
-        match c {
-            '"' => out.push_str("\\\""),
-            '\\' => out.push_str("\\\\"),
-            c if c.is_control() => out.push_str(&format!("\\u{:04x}", c as u32)),
-            c => out.push(c),
-        }
-    }
-    out.push('"');
-    out
-}
-
-pub(super) fn number(value: f64) -> String {
-    format!("{value:?}")
-}
-
-pub(super) fn array(items: impl IntoIterator<Item = String>) -> String {
-    format!("[{}]", items.into_iter().collect::<Vec<_>>().join(", "))
-}
-
-pub(super) fn inline(pairs: &[(&str, String)]) -> String {
-    let pairs: Vec<String> = pairs.iter().map(|(key, value)| format!("{key} = {value}")).collect();
-    format!("{{ {} }}", pairs.join(", "))
-}
-
-pub(super) fn vector(values: &[f64]) -> String {
-    array(values.iter().copied().map(number))
-}
-
-pub(super) fn counts(values: &[usize]) -> String {
-    array(values.iter().map(usize::to_string))
-}
-
-pub(super) fn axes(axes: &[usize]) -> String {
-    array(axes.iter().map(|axis| quote(AXES[*axis])))
-}
-
-/// A number if it was given as one.
-pub(super) fn expression(expression: &Expression) -> String {
-    match expression.as_constant() {
-        Some(value) if value.to_string() == expression.text() => number(value),
-        _ => quote(expression.text()),
-    }
-}
-
-pub(super) fn expressions(all: &[Expression]) -> String {
-    array(all.iter().map(expression))
 }

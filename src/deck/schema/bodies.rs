@@ -1,4 +1,4 @@
-//! Keys of what is analysed: bodies, shapes, boundaries and loads.
+//! Keys of what is analysed: bodies, shapes, boundaries, water.
 
 use super::Kind::{
     Choice, Choices, Count, CountOrCounts, Expression, Expressions, Flag, Number, Points, Special,
@@ -7,12 +7,21 @@ use super::Kind::{
 use super::Need::{Default, Optional, Required};
 use crate::deck::model::SupportMethod;
 
-use super::{AXES, POSITIVE, Section, at_least, between, key};
+use super::loads::OF_BODY;
+use super::{AXES, POSITIVE, Section, UNTIL, at_least, between, from_stage, key};
 
-const SIDE: &str = "The part whose outward normal, in the frame of the shape before rotate, is nearest to this direction: a box's own side, a quarter of a disc.";
-const WITHIN: &str = "Condition on x, y, z at the start, such as \"x*x + y*y < 2\".";
 const SHAPES: &str = "an array of shapes";
-const BALL_KEYS: &[super::Key] = &[
+/// Keys of a box.
+pub const BOX_KEYS: &[super::Key] = &[
+    key("min", Vector, Required, "Lower corner.").unit("m"),
+    key("max", Vector, Required, "Upper corner.").unit("m"),
+];
+pub(super) const CAPSULE_KEYS: &[super::Key] = &[
+    key("from", Vector, Required, "One end.").unit("m"),
+    key("to", Vector, Required, "The other end.").unit("m"),
+    key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
+];
+pub(super) const BALL_KEYS: &[super::Key] = &[
     key("centre", Vector, Required, "Centre.").unit("m"),
     key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
 ];
@@ -43,11 +52,8 @@ pub const SECTIONS: &[Section] = &[
             key("initial_stress", Table("body.initial_stress"), Optional("free of stress"),
                 "Effective Cauchy stress before the first step, tension positive.")
                 .read_by(&[super::LOADED]),
-            key("from", Text, Optional("initial"),
-                "The stage it comes with; \"initial\": it has been there before the first one.")
-                .read_by(&[super::LOADED]),
-            key("until", Text, Optional("it stays"), "The last stage in which it is there.")
-                .read_by(&[super::LOADED]),
+            from_stage("initial"),
+            UNTIL,
         ],
     },
     Section {
@@ -138,10 +144,7 @@ pub const SECTIONS: &[Section] = &[
         name: "shape.box",
         header: "shape.box",
         doc: "min <= x <= max.",
-        keys: &[
-            key("min", Vector, Required, "Lower corner.").unit("m"),
-            key("max", Vector, Required, "Upper corner.").unit("m"),
-        ],
+        keys: BOX_KEYS,
     },
     Section { name: "shape.disc", header: "shape.disc", doc: "|x - centre| <= radius.", keys: BALL_KEYS },
     Section { name: "shape.ball", header: "shape.ball", doc: "|x - centre| <= radius.", keys: BALL_KEYS },
@@ -151,11 +154,7 @@ pub const SECTIONS: &[Section] = &[
         name: "shape.capsule",
         header: "shape.capsule",
         doc: "All within `radius` of a segment.",
-        keys: &[
-            key("from", Vector, Required, "One end.").unit("m"),
-            key("to", Vector, Required, "The other end.").unit("m"),
-            key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
-        ],
+        keys: CAPSULE_KEYS,
     },
     Section {
         name: "shape.polygon",
@@ -206,11 +205,8 @@ pub const SECTIONS: &[Section] = &[
             key("method", Choice(SupportMethod::NAMES), Optional("\"penalty\"; only with surface"),
                 "nitsche: the material's own stress supplies the traction there, and the penalty bears what is left, so that it can be small: more exact, with an unsymmetric tangent.")
                 .read_by(&[super::IMPLICIT]),
-            key("from", Text, Optional("the first stage"),
-                "The stage it comes with; \"initial\": it has been there before the first one.")
-                .read_by(&[super::LOADED]),
-            key("until", Text, Optional("it stays"), "The last stage in which it is there.")
-                .read_by(&[super::LOADED]),
+            from_stage("the first stage"),
+            UNTIL,
         ],
     },
     Section {
@@ -218,9 +214,9 @@ pub const SECTIONS: &[Section] = &[
         header: "boundary.surface",
         doc: "A part of a body's own surface, which moves with it and is held where it was at the start; or the material that lies on a line (2D) or plane (3D) at the start. With slip, what has slid beyond the ends of a line or plane is free, and what has slid onto it is held.",
         keys: &[
-            key("body", Text, Optional("the only body"), "Name of a body given as a shape."),
-            key("side", Choice(SIDES), Optional("the whole surface"), SIDE),
-            key("where", Text, Optional("everywhere"), WITHIN),
+            OF_BODY[0],
+            OF_BODY[1],
+            OF_BODY[2],
             key("line", Points, Optional("-"), "Two ends (2D).").unit("m"),
             key("plane", Points, Optional("-"), "Three corners of a parallelogram, the first between the others (3D).").unit("m"),
         ],
@@ -242,10 +238,7 @@ pub const SECTIONS: &[Section] = &[
         name: "where.box",
         header: "boundary.where.box",
         doc: "A plane, a line or a node where min equals max.",
-        keys: &[
-            key("min", Vector, Required, "Lower corner.").unit("m"),
-            key("max", Vector, Required, "Upper corner.").unit("m"),
-        ],
+        keys: BOX_KEYS,
     },
     Section {
         name: "displacement",
@@ -267,29 +260,6 @@ pub const SECTIONS: &[Section] = &[
         ],
     },
     Section {
-        name: "load",
-        header: "[[load]]",
-        doc: "Exactly one of the keys but from and until. Values are numbers or expressions. In quasi-static analyses a value that holds neither s nor t grows with s; one that holds s or t is taken as it is.",
-        keys: &[
-            key("point", Table("load.point"), Optional("-"), "Force held by material points."),
-            key("gravity", Expressions("X Y Z s t"), Optional("-"), "Acceleration.").unit("m/s2"),
-            key("body_force", Expressions("X Y Z x y z s t"), Optional("-"),
-                "Force per initial volume.")
-                .unit("N/m3"),
-            key("pressure", Table("load.pressure"), Optional("-"),
-                "Pressure on the surface of all bodies, in the current state."),
-            key("traction", Table("load.traction"), Optional("-"),
-                "Dead load per initial area on a body's surface."),
-            key("manufactured", Expressions("X Y Z s"), Optional("-"),
-                "The body force that makes this displacement field exact.").unit("m"),
-            key("from", Text, Optional("the first stage; initial for a constant gravity in a deck with initial_stress"),
-                "The stage it comes with; \"initial\": it has been there before the first one.")
-                .read_by(&[super::LOADED]),
-            key("until", Text, Optional("it stays"), "The last stage in which it is there.")
-                .read_by(&[super::LOADED]),
-        ],
-    },
-    Section {
         name: "water",
         header: "[water]",
         doc: "Still water in the pores of all bodies and around them: the pore pressure is unit_weight (level - height), and 0 above the level, whatever the bodies do. Materials respond with their effective stress; the field `stress` is the total one, effective_stress - pore_pressure. What is below the level is lifted by unit_weight times its volume (at the start of a step), as the gradient of the pore pressure does; densities are those with the water in the pores. Reactions are those of the effective stress. The lift ramps like a load, and acts in full from the first step on where a body has initial_stress.",
@@ -298,67 +268,6 @@ pub const SECTIONS: &[Section] = &[
             key("unit_weight", Number, Default("9.81e3"), "Unit weight of water.").unit("N/m3").range(POSITIVE),
             key("axis", Choice(&AXES), Optional("the last one: y in 2D, z in 3D"),
                 "The vertical axis, upwards."),
-        ],
-    },
-    Section {
-        name: "load.traction",
-        header: "load.traction",
-        doc: "Keeps its direction and its total, whatever the body does. It acts on the body's own surface: at places of its shape, which the points beside them carry along.",
-        keys: &[
-            key("body", Text, Optional("the only body"), "Name of a body given as a shape."),
-            key("side", Choice(SIDES), Optional("the whole surface"), SIDE),
-            key("where", Text, Optional("everywhere"), WITHIN),
-            key("value", Expressions("X Y Z s t"), Required, "Force per initial area.").unit("Pa"),
-        ],
-    },
-    Section {
-        name: "load.surface",
-        header: "load.pressure.surface",
-        doc: "A part of a body's own surface, at the start.",
-        keys: &[
-            key("body", Text, Optional("the only body"), "Name of a body given as a shape."),
-            key("side", Choice(SIDES), Optional("the whole surface"), SIDE),
-            key("where", Text, Optional("everywhere"), WITHIN),
-        ],
-    },
-    Section {
-        name: "load.pressure",
-        header: "load.pressure",
-        doc: "Acts along the inward normal of every surface, and follows the motion; on a surface that is held, the reaction takes it. It is a sum over the points (virtual stress), which needs no surface: what it pushes is where the points' volume ends. `max`, `min` and `abs` are averaged over a point's domain. Water up to level 8: value = \"max(0, 9.81e3*(8-y))\".",
-        keys: &[
-            key("value", Expression("x y z s t"), Required, "Compression positive; a formula has derivatives (no `if`, no comparisons).").unit("Pa"),
-            key("where", Table("load.pressure.where"), Optional("everywhere"),
-                "A part of the surfaces."),
-            key("surface", Table("load.surface"), Optional("-"),
-                "The body's own surface, or a part of it: the pressure then acts at places of its shape, carried by the points beside them, and not by virtual stress. Its area and normal follow the deformation."),
-        ],
-    },
-    Section {
-        name: "load.pressure.where",
-        header: "load.pressure.where",
-        doc: "The pressure acts in full inside a box, and falls smoothly to zero outside: surfaces within that width are pushed too, by less. The fall lies inside the body, too, where points that are too few for it show as an error of the force: 3e-4 with three cells of 2 points a side. A fade of less than a cell is not resolved.",
-        keys: &[
-            key("box", Table("load.pressure.where.box"), Required, "In current positions."),
-            key("fade", Number, Optional("three cells"), "Width of the fall.").unit("m").range(POSITIVE),
-        ],
-    },
-    Section {
-        name: "load.pressure.where.box",
-        header: "load.pressure.where.box",
-        doc: "A plane where min equals max.",
-        keys: &[
-            key("min", Vector, Required, "Lower corner.").unit("m"),
-            key("max", Vector, Required, "Upper corner.").unit("m"),
-        ],
-    },
-    Section {
-        name: "load.point",
-        header: "load.point",
-        doc: "Shared equally by the points nearest to the given places.",
-        keys: &[
-            key("body", Text, Optional("the only body"), "Name of the body."),
-            key("nearest", Points, Required, "Places, one point each: the nearest, at most the diagonal of a cell (and half that of its domain) away.").unit("m"),
-            key("force", Expressions("s t"), Required, "Total force (per metre in plane strain).").unit("N"),
         ],
     },
 ];

@@ -2,6 +2,7 @@
 
 use super::Kind::{Expression, Expressions, Number, Points, Special, Table, Text, Vector};
 use super::Need::{Default, Optional, Required};
+use super::bodies::{BALL_KEYS, BOX_KEYS, CAPSULE_KEYS};
 use super::{DYNAMIC, POSITIVE, Section, at_least, between, key};
 
 pub const SECTIONS: &[Section] = &[
@@ -55,29 +56,19 @@ pub const SECTIONS: &[Section] = &[
         name: "rigid.ball",
         header: "rigid.shape.disc",
         doc: "|x - centre| <= radius.",
-        keys: &[
-            key("centre", Vector, Required, "Centre.").unit("m"),
-            key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
-        ],
+        keys: BALL_KEYS,
     },
     Section {
         name: "rigid.box",
         header: "rigid.shape.box",
         doc: "min <= x <= max.",
-        keys: &[
-            key("min", Vector, Required, "Lower corner.").unit("m"),
-            key("max", Vector, Required, "Upper corner.").unit("m"),
-        ],
+        keys: BOX_KEYS,
     },
     Section {
         name: "rigid.capsule",
         header: "rigid.shape.capsule",
         doc: "All within `radius` of a segment.",
-        keys: &[
-            key("from", Vector, Required, "One end.").unit("m"),
-            key("to", Vector, Required, "The other end.").unit("m"),
-            key("radius", Number, Required, "Radius.").unit("m").range(POSITIVE),
-        ],
+        keys: CAPSULE_KEYS,
     },
     Section {
         name: "rigid.cone",

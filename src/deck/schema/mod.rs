@@ -5,7 +5,8 @@
 //! | `mod.rs` | what a key is |
 //! | `problem.rs` | keys of the analysis: analysis, method, ghost, grid, outputs |
 //! | `materials.rs` | keys of materials, from what the models declare |
-//! | `bodies.rs` | keys of what is analysed: bodies, shapes, boundaries, loads |
+//! | `bodies.rs` | keys of what is analysed: bodies, shapes, boundaries, water |
+//! | `loads.rs` | keys of loads, from what they declare |
 //! | `contact.rs` | keys of rigid bodies and contact |
 //!
 //! Known keys, type and range checks, defaults, the resolved deck and `docs/guide/deck.md` all come
@@ -13,11 +14,13 @@
 
 mod bodies;
 mod contact;
+mod loads;
 pub(crate) mod materials;
 mod problem;
 
 pub use crate::material::parameter::{ANY, POSITIVE, Range, at_least, between, inside};
-pub use bodies::SIDES;
+pub use bodies::{BOX_KEYS, SIDES};
+pub use loads::OF_BODY;
 
 /// Components of a direction, in order.
 pub const AXES: [&str; 3] = ["x", "y", "z"];
@@ -164,16 +167,30 @@ const ON_GRID: Reader = only(
 const ELEMENT_TEST: Reader = only("analysis.type", &["element-test"]);
 const GIMP: Reader = only("method.basis", &["gimp"]);
 
-const fn key(name: &'static str, kind: Kind, need: Need, doc: &'static str) -> Key {
+/// A key without unit, range and readers.
+pub const fn key(name: &'static str, kind: Kind, need: Need, doc: &'static str) -> Key {
     Key { name, kind, unit: "", need, range: ANY, readers: &[], doc }
 }
 
+/// `from` of what may be there before the first stage.
+const fn from_stage(absent: &'static str) -> Key {
+    const DOC: &str =
+        "The stage it comes with; \"initial\": it has been there before the first one.";
+    key("from", Kind::Text, Need::Optional(absent), DOC).read_by(&[LOADED])
+}
+
+const UNTIL: Key =
+    key("until", Kind::Text, Need::Optional("it stays"), "The last stage in which it is there.")
+        .read_by(&[LOADED]);
+
 impl Key {
-    const fn unit(self, unit: &'static str) -> Self {
+    /// With an SI unit.
+    pub const fn unit(self, unit: &'static str) -> Self {
         Key { unit, ..self }
     }
 
-    const fn range(self, range: Range) -> Self {
+    /// With a range for numbers.
+    pub const fn range(self, range: Range) -> Self {
         Key { range, ..self }
     }
 
@@ -198,7 +215,7 @@ pub struct Section {
 /// All sections, in the order of the documentation.
 pub fn sections() -> impl Iterator<Item = &'static Section> {
     let problem = problem::SECTIONS.iter().chain(materials::sections());
-    let analysed = bodies::SECTIONS.iter().chain(contact::SECTIONS);
+    let analysed = bodies::SECTIONS.iter().chain(loads::sections()).chain(contact::SECTIONS);
     problem.chain(analysed).chain(problem::RESULT_SECTIONS)
 }
 

@@ -57,7 +57,7 @@ pub fn check(root: &Table<'_>, deck: &Deck) -> Got<()> {
         None => Ok(()),
     })?;
     root.tables("load", |index, table| match &deck.loads[index] {
-        Load::Manufactured(_) => Err(table.problem(
+        Load::MadeField(_) => Err(table.problem(
             "manufactured",
             "has the equilibrium of plane strain or space; use body_force and [[verify]]",
         )),

@@ -48,27 +48,8 @@ fn material_names(root: &Table<'_>) -> Vec<String> {
     }
 }
 
-/// Names of the bodies as written, so that other sections can refer to faulty ones.
-pub fn names(root: &Table<'_>) -> Vec<String> {
-    let Some(Value::Array(items)) = root.node("body").map(|node| &node.value) else {
-        return Vec::new();
-    };
-    let name_of = |(index, node): (usize, &crate::deck::tree::Node)| {
-        let Value::Table(entries) = &node.value else { return default_name(index) };
-        match entries.iter().find(|entry| entry.key == "name").map(|entry| &entry.node.value) {
-            Some(Value::String(name)) => name.clone(),
-            _ => default_name(index),
-        }
-    };
-    items.iter().enumerate().map(name_of).collect()
-}
-
-fn default_name(index: usize) -> String {
-    format!("body-{}", index + 1)
-}
-
 pub fn bodies(root: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Vec<Body>> {
-    let (materials, names) = (material_names(root), names(root));
+    let (materials, names) = (material_names(root), root.names_of("body"));
     let bodies = root.tables("body", |index, table| {
         if names[..index].contains(&names[index]) {
             table.problem("name", format!("another body is called \"{}\"", names[index]));
@@ -98,15 +79,6 @@ pub fn bodies(root: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Vec<Body>>
         return Err(root.missing("body", "expected a [[body]]"));
     }
     Ok(bodies)
-}
-
-/// The first body without the key `density`, by its index.
-pub fn without_density(root: &Table<'_>) -> Option<usize> {
-    let Some(Value::Array(items)) = root.node("body").map(|node| &node.value) else { return None };
-    items.iter().position(|item| match &item.value {
-        Value::Table(entries) => !entries.iter().any(|entry| entry.key == "density"),
-        _ => false,
-    })
 }
 
 fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {

@@ -1,16 +1,16 @@
 //! `[[boundary]]` and `[[load]]`.
 
-use super::bodies::{self, EarlierSections};
+use super::bodies::EarlierSections;
 use super::{shapes, stages, surfaces};
-use crate::deck::expression::Variable;
 use crate::deck::model::{
-    AnalysisType, Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, PressureZone, Rotation,
-    Support, SupportMethod, Water,
+    AnalysisType, Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, Rotation, Support,
+    SupportMethod, Water,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::schema::{AXES, SIDES};
 use crate::deck::stage::Presence;
+use crate::loads::Around;
 
 /// Penalty factors where the deck says nothing.
 const PENALTY: f64 = 100.0;
@@ -173,7 +173,7 @@ fn body(table: &Table<'_>, key: &'static str, bodies: &[String]) -> Got<usize> {
 }
 
 /// The body that key `body` names, or the only one.
-pub(super) fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
+pub fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
     match (table.given("body"), names) {
         (false, [_]) => Ok(0),
         (false, _) => Err(table.missing("body", "the deck has several bodies")),
@@ -188,10 +188,10 @@ pub fn loads(
     names: &[String],
     read: Option<&[Body]>,
 ) -> Got<(Vec<Load>, Vec<Presence>)> {
-    let dimension = earlier.dimension;
+    let around = Around { root, dimension: earlier.dimension, names, bodies: read };
     let stressed = read.is_some_and(|all| all.iter().any(|body| body.initial_stress.is_some()));
     let all = root.tables("load", |_, table| {
-        let load = load(root, &table, dimension, names, read)?;
+        let load = Load::read(&table, &around)?;
         // Weight that the initial stress balances has acted before.
         let balanced = stressed && matches!(load, Load::Gravity(_)) && !load.depends_on_time();
         let default = if balanced { Presence::BEFORE } else { Presence::default() };
@@ -227,85 +227,4 @@ pub fn water(
 fn same(table: &Table<'_>, one: &str, other: &str) -> bool {
     let text = |key: &str| table.text_if(key).ok().flatten();
     text(one).is_some() && text(one) == text(other)
-}
-
-fn load(
-    root: &Table<'_>,
-    table: &Table<'_>,
-    dimension: usize,
-    names: &[String],
-    read: Option<&[Body]>,
-) -> Got<Load> {
-    let key = table.one_of(&[
-        "point",
-        "gravity",
-        "body_force",
-        "pressure",
-        "traction",
-        "manufactured",
-    ])?;
-    match key {
-        "point" => table.table("point", |t| {
-            let body = of_body(&t, names);
-            let (nearest, force) =
-                (t.points("nearest", dimension), t.expressions_if("force", dimension));
-            let (nearest, force) = (nearest?, force?);
-            let force = force.ok_or_else(|| t.missing("force", ""));
-            if nearest.is_empty() {
-                return Err(t.problem("nearest", "expected one or more positions, found none"));
-            }
-            Ok(Load::Point { body: body?, nearest, force: force? })
-        }),
-        "gravity" => {
-            let gravity = table.expressions_if("gravity", dimension)?;
-            let gravity = gravity.ok_or_else(|| table.missing("gravity", ""))?;
-            let acts = gravity.iter().any(|g| g.as_constant() != Some(0.0));
-            let weightless = read.is_some_and(|all| all.iter().all(|b| b.density == 0.0));
-            if weightless && acts {
-                return Err(table.problem("gravity", "acts on nothing: every body has density 0"));
-            }
-            if let (Some(all), Some(light)) = (read, bodies::without_density(root))
-                && acts
-            {
-                let name = &all[light].name;
-                let what = format!("body \"{name}\" has no density, and others have one");
-                let help = "give it a density; density = 0.0 says that it is to be weightless";
-                return Err(table.problem_with_help("gravity", what, help));
-            }
-            Ok(Load::Gravity(gravity))
-        }
-        "traction" => table.table("traction", |t| {
-            let surface = surfaces::body_surface(&t, dimension, names, read);
-            let value = t.expressions_if("value", dimension)?;
-            let value = value.ok_or_else(|| t.missing("value", ""))?;
-            Ok(Load::Traction { surface: surface?, value })
-        }),
-        "pressure" => table.table("pressure", |t| {
-            let value = t.expression_if("value");
-            let zone = t.table_if("where", |t| {
-                let corners = t.table("box", |t| shapes::corners(&t, dimension, true));
-                let ((min, max), fade) = (corners?, t.number_if("fade")?);
-                Ok(PressureZone { min, max, fade })
-            });
-            let value = value?.ok_or_else(|| t.missing("value", ""))?;
-            if dimension == 2 && value.depends_on(Variable::CurrentZ) {
-                return Err(t.problem("value", "z is not known here: the problem is 2D"));
-            }
-            if let Err(why) = value.averaged() {
-                return Err(t.problem("value", why));
-            }
-            if !t.given("surface") {
-                return Ok(Load::Pressure { value, zone: zone? });
-            }
-            t.refuse(&["where"], "surface has a where of its own")?;
-            let surface =
-                t.table("surface", |t| surfaces::body_surface(&t, dimension, names, read));
-            Ok(Load::SurfacePressure { surface: surface?, value })
-        }),
-        _ => {
-            let all = table.expressions_if(key, dimension)?;
-            let all = all.ok_or_else(|| table.missing(key, ""))?;
-            Ok(if key == "body_force" { Load::BodyForce(all) } else { Load::Manufactured(all) })
-        }
-    }
 }

@@ -23,7 +23,7 @@
 mod analysis;
 mod axisymmetry;
 mod bodies;
-mod conditions;
+pub(super) mod conditions;
 mod contact;
 mod element_test;
 mod ghost;
@@ -34,9 +34,9 @@ pub(super) mod petsc;
 mod probes;
 mod restraint;
 mod results;
-mod shapes;
+pub(super) mod shapes;
 mod stages;
-mod surfaces;
+pub(super) mod surfaces;
 
 use std::path::Path;
 
@@ -54,7 +54,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let staged = root.given("stage");
     let mut analysis = root.table("analysis", |table| analysis::analysis(&table, staged));
     let stages = stages::stages(&root, &mut analysis);
-    let stage_names = stages::names(&root);
+    let stage_names = root.names_of("stage");
     let ghost = ghost::wanted(&root);
     let kind = analysis.as_ref().ok().map(|analysis| analysis.kind);
     let method = root
@@ -81,7 +81,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         stages: &stage_names,
     };
     let bodies = bodies::bodies(&root, &earlier);
-    let names = bodies::names(&root);
+    let names = root.names_of("body");
     let boundaries = conditions::boundaries(&root, &earlier, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &earlier, &names, bodies.as_deref().ok());
     let staging = contact::InStages { names: &stage_names, kind };

@@ -6,33 +6,13 @@ use crate::deck::model::{
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 use crate::deck::stage::{Presence, Stage};
-use crate::deck::tree::{Node, Value};
 
 /// What has been there before the first stage comes with this one.
 pub const INITIAL: &str = "initial";
 
-/// Names of the stages as written, so that other sections can refer to faulty ones.
-pub fn names(root: &Table<'_>) -> Vec<String> {
-    let Some(Value::Array(items)) = root.node("stage").map(|node| &node.value) else {
-        return Vec::new();
-    };
-    let name_of = |(index, node): (usize, &Node)| {
-        let Value::Table(entries) = &node.value else { return default_name(index) };
-        match entries.iter().find(|entry| entry.key == "name").map(|entry| &entry.node.value) {
-            Some(Value::String(name)) => name.clone(),
-            _ => default_name(index),
-        }
-    };
-    items.iter().enumerate().map(name_of).collect()
-}
-
-fn default_name(index: usize) -> String {
-    format!("stage-{}", index + 1)
-}
-
 /// The stages of the deck, at least one; the analysis takes their sums.
 pub fn stages(root: &Table<'_>, analysis: &mut Got<Analysis>) -> Got<Vec<Stage>> {
-    let names = names(root);
+    let names = root.names_of("stage");
     let Ok(analysis) = analysis else { return Ok(Vec::new()) };
     let stages = root.tables("stage", |index, table| stage(&table, analysis, &names, index))?;
     if stages.is_empty() {

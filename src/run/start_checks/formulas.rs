@@ -7,7 +7,7 @@ use crate::deck::{Presence, Scope, When, figure};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::loads::pressure::PressureAt;
-use crate::loads::{Moment, OnSurface, scope_of};
+use crate::loads::{BodyForce, Gravity, Moment, OnSurface, Point, scope_of};
 use crate::material::local;
 use crate::parallel::World;
 use crate::points::Points;
@@ -74,7 +74,7 @@ fn loads<const D: usize>(
     let ends = [(span.factor_start, span.time_start), (span.factor_end, span.time_end)];
     for (index, load) in deck.loads.iter().enumerate() {
         let message = match load {
-            Load::Point { force, .. } => ends.into_iter().find_map(|(s, t)| {
+            Load::Point(Point { force, .. }) => ends.into_iter().find_map(|(s, t)| {
                 let scope = Scope { load_factor: s, time: t, ..Scope::default() };
                 let axis = force.iter().position(|f| !f.value(&scope).is_finite())?;
                 Some(deck.places.say(
@@ -86,8 +86,8 @@ fn loads<const D: usize>(
                     ),
                 ))
             }),
-            Load::Traction { .. } | Load::SurfacePressure { .. } => on_surface(model, index, ends),
-            Load::Gravity(force) | Load::BodyForce(force) => {
+            load if load.surface().is_some() => on_surface(model, index, ends),
+            Load::Gravity(Gravity(force)) | Load::BodyForce(BodyForce(force)) => {
                 let (key, unit) = match load {
                     Load::Gravity(_) => ("gravity", "m/s2"),
                     _ => ("body_force", "N/m3"),
@@ -113,7 +113,7 @@ fn loads<const D: usize>(
                     )
                 })
             }
-            Load::Pressure { .. } => {
+            Load::Pressing(_) => {
                 let Some(pressure) = model.loads[index].pressure() else { continue };
                 let fault = |p: usize| {
                     ends.into_iter().find_map(|(s, t)| {
@@ -136,8 +136,7 @@ fn loads<const D: usize>(
                     )
                 })
             }
-            Load::Water(_) => None,
-            Load::Manufactured(_) => {
+            Load::MadeField(_) => {
                 let Some(field) = &model.manufactured else { continue };
                 let fault = |p: usize| {
                     ends.into_iter().find(|&(s, t)| {
@@ -158,6 +157,8 @@ fn loads<const D: usize>(
                     deck.places.say(&format!("load.{index}.manufactured"), &why)
                 })
             }
+            // Others are asked in each step.
+            _ => None,
         };
         if let Some(message) = message {
             return Err(Error::Input(message));

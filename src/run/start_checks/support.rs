@@ -108,7 +108,7 @@ pub fn falls<const D: usize>(
         if let Load::Gravity(gravity) = load {
             pulled
                 .iter_mut()
-                .zip(gravity)
+                .zip(&gravity.0)
                 .for_each(|(pulled, g)| *pulled |= g.as_constant() != Some(0.0));
         }
     }
