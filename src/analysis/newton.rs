@@ -22,7 +22,7 @@ use crate::transfer::mesh_motion;
 use crate::transfer::refusal::{Cause, Halt, Refusal};
 use crate::transfer::update::{self, Increments};
 
-/// A converged step. Vectors without other mention hold the owned degrees of freedom.
+/// A converged step. Vectors hold the owned degrees of freedom unless said otherwise.
 pub struct Converged {
     /// Nodal increments of local nodes, m.
     pub displacement: Vec<f64>,
@@ -77,7 +77,7 @@ pub fn solve<const D: usize>(
         shape: solver::Shape::of(model, problem.symmetric()),
         equations: numbering.total * D,
         stabilised,
-        // Domains leave cells with more nodes than the corners in them tell apart.
+        // A cell may have more nodes than corners of domains: some motions of the nodes then move no corner.
         null_pivots: !stabilised && matches!(model.deck.method.basis, Basis::Cpdi1 | Basis::Cpdi2),
     };
     let (outcome, used) =
@@ -87,7 +87,8 @@ pub fn solve<const D: usize>(
     }
     let assembled = problem.assembly_seconds;
     clock.add(Phase::Assemble, assembled);
-    // Our own waiting inside the solver is that of assembly; PETSc keeps its own account.
+    // What the program waited for other ranks while the solver ran is time of the assembly, not busy. PETSc counts its
+    // own waiting.
     clock.add_busy(assembled - (traffic::so_far().waited - waited));
     clock.add(Phase::Solve, clock.elapsed() - before - assembled);
 
@@ -148,7 +149,7 @@ pub fn carried<const D: usize>(
     Ok(Carried { made, moved_grid })
 }
 
-/// What the choice of a linear solver reads.
+/// What decides which linear solver is chosen.
 #[derive(Clone, Copy)]
 struct Size {
     shape: solver::Shape,

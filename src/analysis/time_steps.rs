@@ -70,7 +70,7 @@ impl TimeSteps {
         let (mut first, mut begin) = (0, 0.0);
         for (index, stage) in self.stages.iter().enumerate() {
             let duration = stage.duration.unwrap_or(1.0);
-            // Of the stage, from its begin.
+            // Within the stage.
             let (start, end) = match stage.steps {
                 Some(steps) if self.done < first + steps => {
                     let at = |step: usize| duration * (step as f64 / steps as f64);

@@ -1,6 +1,6 @@
 //! How the values of blocks are kept, in single or in double precision, and what their kernels share.
 
-/// A number as it is stored; it counts as double precision.
+/// A number as it is stored; it is computed with in double precision.
 pub trait Stored: Copy + Default + Into<f64> + Send + Sync + 'static {
     /// Whether values are kept in double precision.
     const DOUBLE: bool;
@@ -25,11 +25,11 @@ impl Stored for f64 {
 /// Kernels load four values, of which the last of a block of 3x3 may lie beyond it.
 pub(crate) const BEYOND: usize = 1;
 
-/// Bytes of values between what is used and what is asked for: the rows are too short for the
-/// processor to foresee the next ones.
+/// Values are fetched so many bytes before they are used: the rows are too short for the processor to foresee the
+/// next ones.
 pub(crate) const AHEAD: usize = 8192;
 
-/// Asks for what lies `ahead` bytes further on.
+/// Fetches what lies `ahead` bytes further on into the cache.
 #[inline(always)]
 pub(crate) fn fetch<T>(here: *const T, ahead: usize) {
     #[cfg(target_arch = "x86_64")]

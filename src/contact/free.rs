@@ -17,7 +17,7 @@ use crate::tensor::dense::multiply;
 pub struct FreeBody<const D: usize> {
     /// kg (kg/m in 2D)
     pub mass: f64,
-    /// In the place of the deck, and its inverse.
+    /// I^-1 about the centre of mass, as the deck turns the body, 1/(kg m2).
     inertia_inverse: Matrix3<f64>,
     pub pose: Pose<D>,
     /// m/s

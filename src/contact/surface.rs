@@ -6,7 +6,7 @@ use super::facets::Facets;
 use super::solid::Solid;
 use crate::tensor::Square;
 
-/// What a surface says of a place.
+/// Distance of a place from a surface, with its derivatives.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Near<const D: usize> {
     /// g, m: the distance from the surface, negative inside the rigid body.
@@ -24,9 +24,9 @@ impl<const D: usize> Near<D> {
     }
 }
 
-/// The surface of a rigid body in the place that the deck gives it.
+/// The surface of a rigid body where the deck puts it.
 ///
-/// Where two parts of the surface are equally near, either may be named, always the same one.
+/// Where two parts of the surface are equally near, either may be the answer, but always the same one.
 pub trait Surface<const D: usize>: Debug + Send + Sync {
     fn near(&self, x: &[f64; D]) -> Near<D>;
 

@@ -1,4 +1,4 @@
-//! What is known of the cells around a body's boundary: own ones and those of other ranks.
+//! Cells around the boundaries of bodies: which bodies populate them, on this rank and its neighbours.
 
 use rustc_hash::FxHashMap;
 
@@ -11,7 +11,7 @@ pub struct BoundaryFace {
     pub bodies: u64,
 }
 
-/// What a neighbour rank must know of a cell.
+/// The bodies of a cell; neighbour ranks are told of it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Cell {
     /// Bodies that populate the cell, one bit each.
@@ -23,19 +23,19 @@ pub(crate) struct Cell {
 }
 
 impl Cell {
-    /// What another rank is told of the cell.
+    /// Its number and its bodies, as a message has them.
     pub fn record(self, cell: u64) -> [u64; 4] {
         [cell, self.populated, self.boundary, self.bridge]
     }
 }
 
-/// The cells of this rank, in their order, and those of others that are known.
+/// The populated cells of this rank, ascending, and those of other ranks that it was told of.
 pub(crate) struct KnownCells {
     first: usize,
-    /// Place in `own` of the cells from `first` on; empty where they lie far apart.
+    /// Index in `own` of each cell from number `first` on; empty where the numbers lie far apart.
     table: Vec<u32>,
     pub numbers: Vec<usize>,
-    /// The populated ones.
+    /// Of the populated ones of this rank.
     pub own: Vec<Cell>,
     /// Those of other ranks, and empty ones of this rank.
     pub others: FxHashMap<usize, Cell>,

@@ -58,14 +58,14 @@ const GENERAL: [&str; 18] = [
     "ao_",
     "petsc",
 ];
-/// They would solve with a matrix that the next residual has written into.
+/// These would solve with a matrix that the next residual has already changed.
 const WITHOUT_TANGENT: [&str; 4] =
     ["snes_lag_jacobian", "snes_lag_jacobian_persists", "snes_mf", "snes_mf_operator"];
 /// Limits of linear solvers that PETSc takes as they are.
 const NOT_NEGATIVE: [&str; 4] = ["ksp_max_it", "ksp_rtol", "ksp_atol", "ksp_divtol"];
 /// Nonlinear solvers that assemble and solve as [`super::snes`] needs it.
 const NEWTON: [&str; 2] = ["newtonls", "newtontr"];
-/// For suggestions.
+/// Names that are proposed for a misspelt one.
 const USUAL: [&str; 22] = [
     "ksp_type",
     "ksp_rtol",
@@ -90,7 +90,7 @@ const USUAL: [&str; 22] = [
     "snes_monitor",
     "snes_linesearch_type",
 ];
-/// The prefix under which options are shown around.
+/// The prefix under which solvers are shown the options.
 const PROBE: &str = "probe_";
 
 /// An error that names every option nobody could know, and values that PETSc refuses. Call it

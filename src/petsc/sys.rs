@@ -29,8 +29,8 @@ pub type AnyFunction = unsafe extern "C" fn() -> PetscErrorCode;
 #[cfg(not(petsc_any_function_returns))]
 pub type AnyFunction = unsafe extern "C" fn();
 
-/// What the destructor of a context is given: its address, or since PETSc 3.23 the place of that,
-/// which later releases declare as a pointer to anything.
+/// The argument of a context's destructor: the address of the context, or, since PETSc 3.23, the address of that
+/// address. Later releases declare it as a pointer to anything.
 #[cfg(petsc_place_is_opaque)]
 pub type Destroyed = PetscCtxRt;
 #[cfg(petsc_destroys_by_place)]

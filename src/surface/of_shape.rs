@@ -9,10 +9,9 @@ use crate::deck::shape::{Form, Placement, Shape};
 
 /// Elements per spacing of the points.
 const CUTS: f64 = 2.0;
-/// An element is looked at in so many places along each direction: pieces of it that are not on the
-/// surface do not count.
+/// An element is tested at so many places along each direction: what of it does not lie on the surface does not count.
 const LOOKS: [usize; 2] = [16, 4];
-/// Distance from a surface at which its sides are told, as a share of the spacing.
+/// Distance from a surface, as a share of the spacing, at which its two sides are tested for being inside the shape.
 const SIDE: f64 = 1e-6;
 
 /// What is wanted of a surface: [`crate::deck::model::BodySurface`] without the body.
@@ -26,7 +25,7 @@ impl Part<'_> {
     /// Whether an element with this outward normal in the shape's own frame belongs to the part.
     fn has<const D: usize>(&self, element: &Element<D>, local_normal: &[f64; 3]) -> bool {
         let to_side = self.side.is_none_or(|(axis, upper)| {
-            // Of equal ones the lower direction, so that every element is on one side.
+            // If two directions are equally near, the lower one, so that each element belongs to one side.
             let size = |a: usize| local_normal[a].abs();
             let nearest = (0..D)
                 .fold(0, |best, a| if size(a) > size(best) * (1.0 + 1e-9) { a } else { best });

@@ -35,7 +35,7 @@ impl Piece {
         }
     }
 
-    /// Whether a mean of its places lies on it.
+    /// Whether it is flat, so that the mean of places on it lies on it.
     pub fn is_flat(&self) -> bool {
         matches!(self, Piece::Flat { .. } | Piece::Triangle { .. })
     }

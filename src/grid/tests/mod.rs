@@ -29,7 +29,7 @@ pub(crate) fn wavy_box(element: Element) -> Mesh<3> {
     mesh
 }
 
-/// Numbers in [0, 1) that only depend on where one starts.
+/// Pseudo-random numbers in [0, 1), always the same ones after a seed.
 pub(crate) fn scatter(seed: u64) -> impl FnMut() -> f64 {
     let mut state = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
     move || {

@@ -1,4 +1,4 @@
-//! What a contribution to a step's equations f(u) = f_ext says of itself.
+//! `trait Term`: a contribution to a step's equations f(u) = f_ext.
 
 use crate::system::in_place::InPlace;
 use crate::system::pattern::Pattern;
@@ -17,8 +17,8 @@ pub struct At<'a> {
 /// An addition to a matrix: two local nodes and the block that couples them, N/m.
 pub type Correction<const D: usize> = (u32, u32, Square<D>);
 
-/// Which shares are asked for: what other ranks wait for comes first, and travels while the rest is
-/// added up.
+/// Which shares are asked for. Those that other ranks wait for come first, and are on their way while the rest is
+/// summed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// Those that reach nodes of other ranks.
@@ -42,7 +42,7 @@ impl Health {
         self.not_finite.is_none()
     }
 
-    /// Of both, the first to be named of either kind.
+    /// The first fault of each kind in either.
     pub fn and(self, other: Health) -> Health {
         Health {
             inverted: self.inverted.or(other.inverted),
