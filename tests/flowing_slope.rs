@@ -150,4 +150,14 @@ fn iterations_on_slopes_that_flow() {
     }
     let header = ["top above a line of the grid [h]", "Ghost", "off", "Ghost, F-bar"];
     record_in("unsymmetric.md", "slope-places", &header, &rows);
+    let mut rows = Vec::new();
+    for h in [0.5, 0.25, 0.125, 0.0625] {
+        let of = |dilation: f64| {
+            let run = slope(h, 0.02).set(format!("material.soil.dilation={dilation:?}"));
+            text(iterations(&run.set("analysis.tangent=\"unsymmetric\"").ranks(2)))
+        };
+        rows.push(vec![h.to_string(), of(0.0), of(10.0), of(20.0)]);
+    }
+    let header = ["h [m]", "dilation 0", "10 degrees", "20 degrees, associated"];
+    record_in("unsymmetric.md", "slope-dilation", &header, &rows);
 }
