@@ -379,11 +379,10 @@ fn pressures_of_an_undrained_slope_are_those_of_its_weight() {
         let pressure = points.field("pressure");
         pressure.iter().fold((0.0f64, 0.0f64), |(l, h), p| (l.min(*p), h.max(*p)))
     };
-    // Domains over two cells leave pressures that cancel in each cell: they are rougher than mpm's points.
-    for (basis, most) in [("mpm", 1.0), ("gimp", 1.5), ("cpdi1", 1.5)] {
+    for basis in ["mpm", "gimp", "cpdi1"] {
         let free = Run::of("clay-slope").set(format!("method.basis=\"{basis}\"")).results();
         let (low, high) = extremes(&free);
-        let bounds = -0.3 * weight..most * weight;
+        let bounds = -0.3 * weight..weight;
         assert!(bounds.contains(&low) && bounds.contains(&high), "{basis}: {low:e} to {high:e} Pa");
     }
     let locked = Run::of("clay-slope").set("method.locking=\"none\"").results();
@@ -436,7 +435,7 @@ fn cpdi_does_not_lock() {
         let free = cook(basis).results();
         for (place, wanted) in places {
             let [of_gimp, found] = [&upright, &free].map(|r| displacement_near(r, 10, place, 1));
-            assert!((found / wanted - 1.0).abs() < 0.033, "{basis}, {place:?}: {found}");
+            assert!((found / wanted - 1.0).abs() < 0.02, "{basis}, {place:?}: {found}");
             assert!((found / of_gimp - 1.0).abs() < 2e-3, "{basis}, {place:?}: {found}, {of_gimp}");
         }
         let many = cook(basis).ranks(3).set("parallel.brick=1").results();

@@ -234,8 +234,9 @@ impl<'a, const D: usize> Nodes<'a, D> {
         };
         deforming.iter_mut().for_each(|v| *v *= self.dt);
         let mut deformation = mapping::displacement_gradients(step, &deforming);
-        deformation.common = mapping::common_increments(step, &deforming);
-        let averaged = update::averaged(step, &deforming, &deformation);
+        let rows = &mut deformation.common;
+        let common = mapping::common_changes(step, &deforming, Some(rows));
+        let averaged = update::averaged(&common, &deformation);
         update::require_sound_deformation(self.world, points, &deformation, &averaged)?;
         let straining = update::straining(&deformation, &averaged);
         update::stretch(&deformation, points, Some(before));

@@ -251,7 +251,7 @@ fn increments<const D: usize>(
     let deformation =
         deformation.unwrap_or_else(|| mapping::displacement_gradients(step, deforming));
     let averaged = if later {
-        update::averaged(step, deforming, &deformation)
+        update::averaged(&mapping::common_changes(step, deforming, None), &deformation)
     } else {
         Deformation::default()
     };

@@ -7,7 +7,7 @@
 //! corners' cells; cells with other nodes are left out. The shares sum to one, so that linear fields stay exact
 //! whatever the domain's shape.
 
-use super::centre::{Moments, RowNodes, add_cell_gradient};
+use super::centre::{Moments, RowNodes, part_of};
 use super::{Influences, lattice_of};
 use crate::error::Result;
 use crate::grid::{Grid, Lattice};
@@ -102,26 +102,6 @@ fn parts<const D: usize>(
     }
 }
 
-/// Visits the parts of all points' domains.
-fn for_each_part<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    influences: &Influences<D>,
-    corners: impl Fn(usize) -> [[f64; D]; 8],
-    mut visit: impl FnMut(usize, &Part<D>),
-) -> Result<()> {
-    let lattice = lattice_of(grid)?;
-    let mut found = Vec::new();
-    for p in 0..points.len() {
-        let row = &influences.nodes[influences.row(p)];
-        parts(lattice, &corners(p), points.volume(p), row, &mut found);
-        for part in &found {
-            visit(p, part);
-        }
-    }
-    Ok(())
-}
-
 /// Moments of this rank's domains at the lowest node of each cell (local).
 pub(super) fn moments<const D: usize>(
     grid: &Grid<D>,
@@ -130,14 +110,20 @@ pub(super) fn moments<const D: usize>(
     rows: RowNodes<'_>,
     corners: impl Fn(usize) -> [[f64; D]; 8],
 ) -> Result<Vec<Moments>> {
+    let lattice = lattice_of(grid)?;
     let mut sums = vec![Moments::default(); rows.count];
-    for_each_part(grid, points, influences, corners, |p, part| {
-        let sum = &mut sums[rows.of(p)[part.entries[0]] as usize];
-        for (mask, moment) in sum.iter_mut().enumerate().take(1 << D) {
-            let of = |a: usize| if mask >> a & 1 == 1 { part.place[a] } else { 1.0 };
-            *moment += points.volume(p) * part.share * (0..D).map(of).product::<f64>();
+    let mut found = Vec::new();
+    for p in 0..points.len() {
+        let row = &influences.nodes[influences.row(p)];
+        parts(lattice, &corners(p), points.volume(p), row, &mut found);
+        for part in &found {
+            let sum = &mut sums[rows.of(p)[part.entries[0]] as usize];
+            for (mask, moment) in sum.iter_mut().enumerate().take(1 << D) {
+                let of = |a: usize| if mask >> a & 1 == 1 { part.place[a] } else { 1.0 };
+                *moment += points.volume(p) * part.share * (0..D).map(of).product::<f64>();
+            }
         }
-    })?;
+    }
     Ok(sums)
 }
 
@@ -150,16 +136,19 @@ pub(super) fn fill<const D: usize>(
     sums: &[Moments],
     corners: impl Fn(usize) -> [[f64; D]; 8],
 ) -> Result<()> {
-    let spacing = lattice_of(grid)?.spacing;
-    let mut gradients = vec![[0.0; D]; influences.nodes.len()];
-    for_each_part(grid, points, influences, corners, |p, part| {
-        let sum = &sums[rows.of(p)[part.entries[0]] as usize];
-        let start = influences.row(p).start;
-        for (corner, entry) in part.entries.iter().enumerate().take(1 << D) {
-            let gradient = &mut gradients[start + entry];
-            add_cell_gradient(gradient, part.share / sum[0], sum, corner, &spacing);
-        }
-    })?;
-    influences.centre_gradients = gradients;
+    let lattice = lattice_of(grid)?;
+    influences.centre_gradients = vec![[0.0; D]; influences.nodes.len()];
+    let (mut found, mut of_point) = (Vec::new(), Vec::new());
+    for p in 0..points.len() {
+        let row = influences.row(p);
+        let start = row.start;
+        parts(lattice, &corners(p), points.volume(p), &influences.nodes[row], &mut found);
+        of_point.clear();
+        of_point.extend(found.iter().map(|part| {
+            let sum = &sums[rows.of(p)[part.entries[0]] as usize];
+            part_of(part.share, part.entries, sum, &lattice.spacing, false)
+        }));
+        influences.add_parts(start, &of_point);
+    }
     Ok(())
 }

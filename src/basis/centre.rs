@@ -9,10 +9,11 @@
 //! without F-bar. A uniform deformation stays what it is.
 //!
 //! For `mpm` the sums run over the points of the cell. For `gimp` they run over the parts of all domains that lie in
-//! the cell, whichever rank they live on, and a point takes the mean of its cells, each weighted by its share of
-//! the domain: Σ_c w_pc Σ_q V_q w_qc <∇N>_qc / Σ_q V_q w_qc. The functions of a cell are linear along
+//! the cell, whichever rank they live on: Σ_q V_q w_qc <∇N>_qc / Σ_q V_q w_qc with the shares w_qc of the domains. A
+//! point has the change of volume of its cells ([`super::cell_parts`]). The functions of a cell are linear along
 //! each axis, so that moments of the parts give these means.
 
+use super::cell_parts::CellPart;
 use super::hats::spans;
 use super::product::for_each_index;
 use super::radial::{Piece, pieces_of_rings};
@@ -168,27 +169,66 @@ pub(super) fn fill_from_domains<const D: usize>(
     influences.centre_gradients = vec![[0.0; D]; influences.nodes.len()];
     influences.centre_hoop = vec![0.0; influences.hoop.len()];
     let mut parts: [Vec<Piece>; D] = std::array::from_fn(|_| Vec::new());
+    let mut of_point = Vec::new();
     for p in 0..points.len() {
         pieces(grid, lattice, points, p, rings, &mut parts)?;
         let (nodes, start) = (rows.of(p), influences.row(p).start);
         let counts = parts.each_ref().map(|line| line.len());
+        of_point.clear();
         for_each_index(&counts, |index| {
             let sum = &sums[nodes[place_in_row(&counts, index)] as usize];
             let share: f64 = (0..D).map(|a| parts[a][index[a]].share).product();
-            let weight = share / sum[0];
-            for corner in 0..1usize << D {
+            let mut entries = [0; 8];
+            for (corner, entry) in entries.iter_mut().enumerate().take(1 << D) {
                 let node = std::array::from_fn(|a| index[a] + (corner >> a & 1));
-                let at = start + place_in_row(&counts, node);
-                let gradient = &mut influences.centre_gradients[at];
-                add_cell_gradient(gradient, weight, sum, corner, &lattice.spacing);
-                if rings {
-                    let all = (1 << D) - 1;
-                    influences.centre_hoop[at] += weight * product_mean(&sum[4..], corner, all);
-                }
+                *entry = place_in_row(&counts, node);
             }
+            of_point.push(part_of(share, entries, sum, &lattice.spacing, rings));
         });
+        influences.add_parts(start, &of_point);
     }
     Ok(())
+}
+
+/// The part of a domain in a cell with these `moments`, whose nodes are at `entries` of the point's row.
+pub(super) fn part_of<const D: usize>(
+    share: f64,
+    entries: [usize; 8],
+    moments: &Moments,
+    spacing: &[f64; D],
+    rings: bool,
+) -> CellPart<D> {
+    let mut part = CellPart {
+        share,
+        entries: entries.map(|entry| entry as u16),
+        gradients: [[0.0; D]; 8],
+        hoops: [0.0; 8],
+    };
+    let weight = 1.0 / moments[0];
+    for corner in 0..1usize << D {
+        add_cell_gradient(&mut part.gradients[corner], weight, moments, corner, spacing);
+        if rings {
+            part.hoops[corner] = weight * product_mean(&moments[4..], corner, (1 << D) - 1);
+        }
+    }
+    part
+}
+
+impl<const D: usize> Influences<D> {
+    /// Ends the next point's cells, whose row begins at `start`: their means go to the rows of F-bar, and they
+    /// are kept if there are several.
+    pub(super) fn add_parts(&mut self, start: usize, parts: &[CellPart<D>]) {
+        for part in parts {
+            for (place, row, hoop) in part.nodes() {
+                let mean = &mut self.centre_gradients[start + place];
+                mean.iter_mut().zip(row).for_each(|(mean, g)| *mean += part.share * g);
+                if let Some(mean) = self.centre_hoop.get_mut(start + place) {
+                    *mean += part.share * hoop;
+                }
+            }
+        }
+        self.parts.push(parts);
+    }
 }
 
 /// Place of a node in a row of domains; `counts`: cells along each axis, one less than nodes.
@@ -197,7 +237,7 @@ fn place_in_row<const D: usize>(counts: &[usize; D], index: [usize; D]) -> usize
 }
 
 /// Adds `weight` times Σ V ∇N of the node at `corner` (a bit per axis) of a cell with these `moments`, 1/m.
-pub(super) fn add_cell_gradient<const D: usize>(
+fn add_cell_gradient<const D: usize>(
     gradient: &mut [f64; D],
     weight: f64,
     moments: &Moments,

@@ -10,7 +10,7 @@
 //! | `gimp` | `hats.rs` | cells that a domain overlaps, and means of hats over it |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
-//! | `locking` | `centre.rs`; `box_means.rs` for `cpdi1` and `cpdi2` | gradients of cells, for F-bar |
+//! | `locking` | `centre.rs`; `box_means.rs` for `cpdi1` and `cpdi2`; `cell_parts.rs` | gradients of cells, for F-bar |
 //! | `symmetry` | `radial.rs` | rings: S, its gradient and S/r, weighted by the radius |
 //! | (lattices) | `product.rs` | functions of one axis multiplied |
 //! | (assembly) | `groups.rs` | points that touch the same nodes |
@@ -31,11 +31,13 @@ mod tests;
 
 pub use groups::Groups;
 
+mod cell_parts;
 pub(crate) mod corner;
 pub(crate) mod cpdi1;
 pub mod cpdi2;
 pub(crate) mod row;
 
+pub use cell_parts::{CellPart, CellParts};
 pub use row::Row;
 
 use rustc_hash::FxHashMap;
@@ -73,6 +75,8 @@ pub struct Influences<const D: usize> {
     pub hoop: Vec<f64>,
     /// The hoop row that F-bar takes in its place, 1/m; empty without F-bar or axisymmetry.
     pub centre_hoop: Vec<f64>,
+    /// With F-bar those of domains in several cells, of which `centre_gradients` has the means.
+    pub parts: CellParts<D>,
     /// Where the nodes come from, of bases that collect them place by place.
     pub cells: PointCells,
 }
@@ -120,6 +124,7 @@ impl<const D: usize> Influences<D> {
             centre_gradients: Vec::new(),
             hoop: Vec::new(),
             centre_hoop: Vec::new(),
+            parts: CellParts::default(),
             cells: PointCells::default(),
         }
     }

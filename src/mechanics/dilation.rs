@@ -27,21 +27,18 @@
 //! A' the tangent of [`super::contribution`] with s for tau and P c P for the moduli c (P takes the mean over
 //! the directions away), n Q = R - kappa/n 1, n q = l - kappa/n 1. Points that share their cells share g_0: of the
 //! last three terms the cells need the sums over the points only.
+//!
+//! For a domain in several cells det dF_0 = Σ w_c det dF_c, hence g_0 = Σ v_c g_c, v_c = w_c det dF_c / det dF_0, and
+//! the last term is pi/n (Σ v_c (e_ca x e_cb - g_cb x g_ca) - e_a x e_b), the second derivative of ln det dF_0.
 
 use super::Increment;
 use super::tangent::Expansion;
 use crate::tensor::dense::{self, Square};
 
-/// dF_bar - 1 from dF - 1 (`increment`) and dF_0 - 1 (`centre`). Not a number where a determinant
+/// dF_bar - 1 from dF - 1 (`increment`) and det dF_0 - 1 (`common`). Not a number where a determinant
 /// is not positive.
-#[inline]
-pub fn averaged<const D: usize>(increment: &Square<D>, centre: &Square<D>) -> Square<D> {
-    within(increment, dense::determinant_excess(centre))
-}
-
-/// [`averaged`] of det dF_0 - 1.
 #[inline(always)]
-pub(crate) fn within<const D: usize>(increment: &Square<D>, common: f64) -> Square<D> {
+pub fn within<const D: usize>(increment: &Square<D>, common: f64) -> Square<D> {
     grown(increment, growth(dense::determinant_excess(increment), common, D))
 }
 
@@ -85,45 +82,28 @@ pub(crate) fn grown<const D: usize>(increment: &Square<D>, growth: f64) -> Squar
 pub struct Dilation<const D: usize> {
     /// R_ij and R_zz in the frame, l_kl and l_zz, kappa, pi; Pa.
     pub moduli: Expansion<D>,
-    /// dy/dx of the frame y, with the hoop's
-    pub back: (Square<D>, f64),
     /// 1/n
     pub share: f64,
     /// dF^-1
     here: (Square<D>, f64),
-    /// dF_0^-1
-    common: (Square<D>, f64),
-}
-
-/// Rows of a node in the current state, 1/m; the hoop's behind.
-#[derive(Debug, Clone, Copy)]
-pub struct Rows<const D: usize> {
-    /// g
-    pub own: ([f64; D], f64),
-    /// g_0
-    pub common: ([f64; D], f64),
-    /// r = (g_0 - g) / n, the hoops' along the radius
-    pub swelling: [f64; D],
 }
 
 impl<const D: usize> Dilation<D> {
     #[inline]
-    pub(crate) fn new(
-        moduli: Expansion<D>,
-        back: (Square<D>, f64),
-        share: f64,
-        [here, common]: [Increment<'_, D>; 2],
-    ) -> Self {
-        Dilation { moduli, back, share, here: inverse(here), common: inverse(common) }
+    pub(crate) fn new(moduli: Expansion<D>, share: f64, increment: Increment<'_, D>) -> Self {
+        Dilation { moduli, share, here: inverse(increment) }
     }
 
-    /// From a node's gradients and hoop rows at the step's start, `own` at the point and `common` of its cells.
+    /// g of a node, from its gradient and hoop row at the step's start.
     #[inline]
-    pub fn rows(&self, own: (&[f64; D], f64), common: (&[f64; D], f64)) -> Rows<D> {
-        let own = mapped(own, &self.here);
-        let common = mapped(common, &self.common);
-        let swelling = swelling(&own, &common, self.share);
-        Rows { own, common, swelling }
+    pub fn own(&self, row: (&[f64; D], f64)) -> ([f64; D], f64) {
+        mapped(row, &self.here)
+    }
+
+    /// r = (g_0 - g) / n, the hoops' along the radius, from g and g_0.
+    #[inline]
+    pub fn swelling(&self, own: &([f64; D], f64), common: &([f64; D], f64)) -> [f64; D] {
+        swelling(own, common, self.share)
     }
 
     /// c_b = l g_b + kappa r_b: change of pi by the node's displacement, Pa/m; `frame`: its rows in the frame.

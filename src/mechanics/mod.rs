@@ -133,22 +133,21 @@ pub fn contribution<const D: usize>(
     (placement.contribution(&update), update.state(&start.material))
 }
 
-/// [`contribution`] with F-bar: `centre` is dF_0 - 1. The stress, its part of the tangent and the
+/// [`contribution`] with F-bar: `common` is det dF_0 - 1. The stress, its part of the tangent and the
 /// state are those of dF_bar; [`Dilation`] is what the force and the tangent have beside.
 #[inline]
 pub fn averaged_contribution<const D: usize>(
     frame: Frame,
     start: &StepStart,
     increment: &[[f64; D]; D],
-    centre: &[[f64; D]; D],
+    common: f64,
 ) -> (Contribution<D>, Dilation<D>, StressState) {
-    let update = update::update(start, (&dilation::averaged(increment, centre)).into());
+    let update = update::update(start, (&dilation::within(increment, common)).into());
     let placement = Placement::new(frame, start, &dense::plus_unit(increment), 1.0);
     let contribution = placement.contribution(&update);
     let sums = tangent::sums(&update.response, D);
     let moduli = sums.expansion(&update, (&placement.back, 0.0), placement.scale);
-    let both = [increment.into(), centre.into()];
-    let dilation = Dilation::new(moduli, (placement.back, 1.0), 1.0 / D as f64, both);
+    let dilation = Dilation::new(moduli, 1.0 / D as f64, increment.into());
     (contribution, dilation, update.state(&start.material))
 }
 
@@ -168,6 +167,34 @@ pub fn shared_contribution<const D: usize>(
     let sums = tangent::sums(&update.response, D).take_from(&mut update.response, D);
     let share = sums.expansion(&update, (&placement.back, 0.0), placement.scale);
     (placement.contribution(&update), share, state)
+}
+
+/// dF_zz - 1 = Σ_a H_a u_ar of a ring ([`crate::basis::radial`]).
+#[inline]
+pub fn hoop_increment<const D: usize>(
+    rows: &[f64],
+    displacement: impl Fn(usize) -> [f64; D],
+) -> f64 {
+    rows.iter().enumerate().map(|(a, row)| row * displacement(a)[0]).sum()
+}
+
+/// dF - 1 = Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7): without the unit, in which small gradients
+/// would lose their digits.
+#[inline]
+pub fn displacement_gradient<const D: usize>(
+    gradients: &[[f64; D]],
+    displacement: impl Fn(usize) -> [f64; D],
+) -> [[f64; D]; D] {
+    let mut increment = [[0.0; D]; D];
+    for (a, gradient) in gradients.iter().enumerate() {
+        let u = displacement(a);
+        for i in 0..D {
+            for j in 0..D {
+                increment[i][j] += u[i] * gradient[j];
+            }
+        }
+    }
+    increment
 }
 
 /// How a frame y lies to the current state x: T_ij = scale tau_im (dy/dx)_jm.

@@ -42,23 +42,22 @@ pub fn averaged<const D: usize>(own: Increment<'_, D>, common: f64) -> (Square<D
     (dilation::grown(own.block, growth), own.hoop + growth * (1.0 + own.hoop))
 }
 
-/// Stress and tangent of a ring in `frame`; with F-bar where the increment at the `centre` of the cells
-/// is given. Limits as in [`super::stress`].
+/// Stress and tangent of a ring in `frame`; with F-bar where det dF_0 - 1 of the cells is given, with its
+/// hoop. Limits as in [`super::stress`].
 #[inline]
 pub fn ring_contribution<const D: usize>(
     frame: Frame,
     start: &StepStart,
     increment: Increment<'_, D>,
-    centre: Option<Increment<'_, D>>,
+    common: Option<f64>,
 ) -> (Contribution<D>, Hoop<D>, StressState) {
-    let common = centre.map(dilation::volume_change);
     let ring = Ring::new(frame, start, increment, common);
     let (contribution, mut hoop) = ring.contribution();
-    hoop.dilation = centre.map(|centre| {
-        let back = (ring.placement.back, ring.back);
+    hoop.dilation = common.map(|_| {
+        let back = (&ring.placement.back, ring.back);
         let sums = tangent::sums(&ring.update.response, 3);
-        let moduli = sums.expansion(&ring.update, (&back.0, back.1), ring.placement.scale);
-        Dilation::new(moduli, back, 1.0 / 3.0, [increment, centre])
+        let moduli = sums.expansion(&ring.update, back, ring.placement.scale);
+        Dilation::new(moduli, 1.0 / 3.0, increment)
     });
     (contribution, hoop, ring.update.state(&start.material))
 }

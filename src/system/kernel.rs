@@ -5,7 +5,7 @@
 use crate::mechanics::{Contribution, Expansion, Hoop};
 use crate::tensor::fused::multiply_add;
 
-use super::cell_rows::CellRows;
+use super::cell_rows::{CellNow, CellRows, Now};
 use super::scatter::BlockRows;
 use super::support_columns::ColumnRuns;
 
@@ -131,25 +131,17 @@ impl Batch {
         }
     }
 
-    /// Adds e_a x Σ V (q g_b + kappa/n^2 e_b) - Σ V pi/n g_0b x g_0a of cells.
+    /// Adds e_a x Σ V (q g_b + kappa/n^2 e_b) of cells ([`CellRows::change`]), and - Σ V pi/n g_0b x g_0a where
+    /// they are one.
     #[inline(always)]
     pub fn push_cells<const D: usize, const FUSED: bool>(&mut self, cells: &CellRows<D>) {
-        let (nodes, stride, first) = (self.nodes, self.stride, self.lines);
+        let (stride, first, rings) = (self.stride, self.lines, self.depth > D);
         let plane = self.room * stride;
-        let rings = self.depth > D;
-        self.lines += self.depth;
-        let line = |j: usize| (first + j) * nodes..(first + j + 1) * nodes;
-        for j in 0..D {
-            let targets = self.gradients[line(j)].iter_mut();
-            targets.zip(&cells.gradients).for_each(|(target, (row, _))| *target = row[j]);
-        }
-        if rings {
-            let targets = self.gradients[line(D)].iter_mut();
-            targets.zip(&cells.gradients).for_each(|(target, (_, hoop))| *target = *hoop);
-        }
+        self.push_rows::<D>(cells.gradients.iter().copied().enumerate());
+        let trace = if cells.is_single() { cells.trace } else { 0.0 };
         for (b, (row, hoop)) in cells.gradients.iter().enumerate() {
             let change = cells.change::<FUSED>(b);
-            let turn = row.map(|g| cells.trace * g);
+            let turn = row.map(|g| trace * g);
             for i in 0..D {
                 let at = |j: usize| i * plane + (first + j) * stride + b * D;
                 for j in 0..D {
@@ -164,9 +156,52 @@ impl Batch {
                     target.fill(0.0);
                     if i == 0 {
                         target.copy_from_slice(&change);
-                        target[0] -= cells.trace * hoop;
+                        target[0] -= trace * hoop;
                     }
                 }
+            }
+        }
+    }
+
+    /// Adds Σ V v_c pi/n (e_ca x e_cb - g_cb x g_ca) of one cell of several.
+    #[inline(always)]
+    pub fn push_cell<const D: usize>(&mut self, cell: &CellNow<D>) {
+        let (nodes, stride, first) = (self.nodes, self.stride, self.lines);
+        let plane = self.room * stride;
+        self.gradients[first * nodes..(first + self.depth) * nodes].fill(0.0);
+        self.push_rows::<D>(cell.nodes().map(|(place, row)| (place, *row)));
+        for i in 0..D {
+            let lines = i * plane + first * stride;
+            self.flux[lines..lines + self.depth * stride].fill(0.0);
+            for (b, (row, hoop)) in cell.nodes() {
+                let turn = row.map(|g| cell.trace * g);
+                let hoop = cell.trace * hoop;
+                let mut expansion = turn;
+                expansion[0] += hoop;
+                self.flux[lines + i * stride + b * D..][..D].copy_from_slice(&expansion);
+                for j in 0..D {
+                    self.flux[lines + j * stride + b * D + j] -= turn[i];
+                }
+                if i == 0 && self.depth > D {
+                    let target = &mut self.flux[lines + D * stride + b * D..][..D];
+                    target.copy_from_slice(&expansion);
+                    target[0] -= hoop;
+                }
+            }
+        }
+    }
+
+    /// Takes lines for the rows of nodes, with the hoops' of rings.
+    #[inline(always)]
+    fn push_rows<const D: usize>(&mut self, rows: impl Iterator<Item = (usize, Now<D>)>) {
+        let first = self.lines * self.nodes;
+        self.lines += self.depth;
+        for (place, (row, hoop)) in rows {
+            for j in 0..D {
+                self.gradients[first + j * self.nodes + place] = row[j];
+            }
+            if self.depth > D {
+                self.gradients[first + D * self.nodes + place] = hoop;
             }
         }
     }

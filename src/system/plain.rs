@@ -2,17 +2,16 @@
 //! point after the other as the formulas read: what [`crate::system::terms::stress::assemble`] is compared
 //! with.
 
+use crate::basis::Influences;
 use crate::deck::model::Frame;
-use crate::mechanics::Increment;
-use crate::mechanics::dilation::{Dilation, Rows};
+use crate::mechanics::dilation::{self, Dilation};
+use crate::mechanics::{Increment, displacement_gradient, hoop_increment};
 use crate::tensor::dense;
 
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 use super::scatter::BlockMatrix;
-use super::terms::stress::{
-    StepPoints, displacement_gradient, hoop_increment, respond, respond_averaged, respond_ring,
-};
+use super::terms::stress::{StepPoints, respond, respond_averaged, respond_ring};
 use super::terms::term::Health;
 
 /// As [`crate::system::terms::stress::assemble`], to rounding.
@@ -36,7 +35,6 @@ pub fn assemble<const D: usize>(
             std::array::from_fn(|i| displacement[nodes[a] as usize * D + i])
         };
         let increment = displacement_gradient(gradients, nodal);
-        let centres = step.influences.centre_gradients.get(row.clone()).unwrap_or_default();
         if !step.influences.hoop.is_empty() {
             let block = ring(step, frame, p, nodes, displacement, force, &mut health);
             if let Some(block) = block {
@@ -44,11 +42,11 @@ pub fn assemble<const D: usize>(
             }
             continue;
         }
-        let made = if centres.is_empty() {
+        let cells = cells(step.influences, p, nodal);
+        let made = if cells.is_empty() {
             respond(step, frame, p, &increment, &mut health).map(|made| (made, None))
         } else {
-            let centre = displacement_gradient(centres, nodal);
-            respond_averaged(step, frame, p, [&increment, &centre], &mut health)
+            respond_averaged(step, frame, p, &increment, change_of(&cells), &mut health)
                 .map(|(made, dilation)| (made, Some(dilation)))
         };
         let Some((made, dilation)) = made else { continue };
@@ -78,45 +76,115 @@ pub fn assemble<const D: usize>(
         }
         if let Some(dilation) = &dilation {
             let frame = |a: usize| (mapped[a], 0.0);
-            let rows = |a: usize| dilation.rows((&gradients[a], 0.0), (&centres[a], 0.0));
-            dilate(dilation, made.volume, (nodes, frame, rows), force, &mut block);
+            let own = |a: usize| dilation.own((&gradients[a], 0.0));
+            dilate(dilation, made.volume, (nodes, frame, own, &cells), force, &mut block);
         }
         stiffness.add(numbering, pattern, nodes, &block);
     }
     health
 }
 
+/// A cell of a point in the current state.
+struct Cell<const D: usize> {
+    /// w_c
+    share: f64,
+    /// det dF_c, with the hoop's
+    growth: f64,
+    /// g_c of each node of the point's row, and the hoop's; zero away from the cell
+    rows: Vec<([f64; D], f64)>,
+}
+
+/// The cells of point `p`; none without F-bar.
+fn cells<const D: usize>(
+    influences: &Influences<D>,
+    p: usize,
+    nodal: impl Fn(usize) -> [f64; D],
+) -> Vec<Cell<D>> {
+    let row = influences.row(p);
+    let Some(means) = influences.centre_gradients.get(row.clone()) else { return Vec::new() };
+    let hoops = influences.centre_hoop.get(row.clone()).unwrap_or_default();
+    let of_rows = |share: f64, gradients: &[[f64; D]], hoops: &[f64]| {
+        let block = displacement_gradient(gradients, &nodal);
+        let hoop = hoop_increment(hoops, &nodal);
+        let back = dilation::inverse(Increment { block: &block, hoop });
+        let growth = dense::determinant(&dense::plus_unit(&block)) * (1.0 + hoop);
+        let now = |a: usize| {
+            dilation::mapped((&gradients[a], hoops.get(a).copied().unwrap_or(0.0)), &back)
+        };
+        Cell { share, growth, rows: (0..gradients.len()).map(now).collect() }
+    };
+    let parts = influences.parts.of(p);
+    if parts.is_empty() {
+        return vec![of_rows(1.0, means, hoops)];
+    }
+    let of_part = |part: &crate::basis::CellPart<D>| {
+        let (mut gradients, mut hoops) = (vec![[0.0; D]; row.len()], vec![0.0; row.len()]);
+        for (place, gradient, hoop) in part.nodes() {
+            (gradients[place], hoops[place]) = (*gradient, hoop);
+        }
+        of_rows(part.share, &gradients, &hoops)
+    };
+    parts.iter().map(of_part).collect()
+}
+
+/// det dF_0 - 1
+fn change_of<const D: usize>(cells: &[Cell<D>]) -> f64 {
+    cells.iter().map(|cell| cell.share * cell.growth).sum::<f64>() - 1.0
+}
+
 /// What F-bar adds to force and block ([`mechanics::dilation`](crate::mechanics::dilation)), term by term.
 fn dilate<const D: usize>(
     dilation: &Dilation<D>,
     volume: f64,
-    (nodes, frame, rows): (&[u32], impl Fn(usize) -> ([f64; D], f64), impl Fn(usize) -> Rows<D>),
+    (nodes, frame, own, cells): (
+        &[u32],
+        impl Fn(usize) -> ([f64; D], f64),
+        impl Fn(usize) -> ([f64; D], f64),
+        &[Cell<D>],
+    ),
     force: &mut [f64],
     block: &mut [f64],
 ) {
     let (moduli, count) = (&dilation.moduli, nodes.len());
     let pressure = moduli.trace * dilation.share;
+    let whole = 1.0 + change_of(cells);
+    let share = |cell: &Cell<D>| cell.share * cell.growth / whole;
+    let common = |a: usize| {
+        let mut common = ([0.0; D], 0.0);
+        for cell in cells {
+            for j in 0..D {
+                common.0[j] += share(cell) * cell.rows[a].0[j];
+            }
+            common.1 += share(cell) * cell.rows[a].1;
+        }
+        common
+    };
+    let swelling = |a: usize| dilation.swelling(&own(a), &common(a));
+    let along = |(g, h): ([f64; D], f64), i: usize| if i == 0 { g[0] + h } else { g[i] };
     for a in 0..count {
-        let (in_frame, of_a) = (frame(a), rows(a));
+        let (in_frame, of_a) = (frame(a), swelling(a));
         for i in 0..D {
-            force[nodes[a] as usize * D + i] += volume * moduli.trace * of_a.swelling[i];
+            force[nodes[a] as usize * D + i] += volume * moduli.trace * of_a[i];
         }
         for b in 0..count {
-            let (frame_b, of_b) = (frame(b), rows(b));
-            let change = dilation.change_of_trace((&frame_b.0, frame_b.1), &of_b.swelling);
+            let (frame_b, of_b) = (frame(b), swelling(b));
+            let change = dilation.change_of_trace((&frame_b.0, frame_b.1), &of_b);
             for i in 0..D {
                 let hoop_force = if i == 0 { in_frame.1 * moduli.hoop_rate } else { 0.0 };
                 let stress = dense::dot(&moduli.rate[i], &in_frame.0) + hoop_force;
                 for k in 0..D {
-                    let turn = |of: &dyn Fn(&Rows<D>) -> ([f64; D], f64)| {
-                        let ((g_a, h_a), (g_b, h_b)) = (of(&of_a), of(&of_b));
+                    let turn = |(g_a, h_a): ([f64; D], f64), (g_b, h_b): ([f64; D], f64)| {
                         g_b[i] * g_a[k] + if i == 0 && k == 0 { h_a * h_b } else { 0.0 }
                     };
-                    let turned = turn(&|rows| rows.own) - turn(&|rows| rows.common);
-                    block[((a * D + i) * count + b) * D + k] += volume
-                        * (stress * of_b.swelling[k]
-                            + of_a.swelling[i] * change[k]
-                            + pressure * turned);
+                    let both = |a, b| along(a, i) * along(b, k);
+                    let second: f64 = cells
+                        .iter()
+                        .map(|cell| (cell, cell.rows[a], cell.rows[b]))
+                        .map(|(cell, a, b)| share(cell) * (both(a, b) - turn(a, b)))
+                        .sum();
+                    let turned = turn(own(a), own(b)) + second - both(common(a), common(b));
+                    block[((a * D + i) * count + b) * D + k] +=
+                        volume * (stress * of_b[k] + of_a[i] * change[k] + pressure * turned);
                 }
             }
         }
@@ -137,18 +205,12 @@ fn ring<const D: usize>(
     let row = step.influences.row(p);
     let nodal =
         |a: usize| -> [f64; D] { std::array::from_fn(|i| displacement[nodes[a] as usize * D + i]) };
-    let increment = |gradients: &[[f64; D]], hoops: &[f64]| {
-        (displacement_gradient(gradients, nodal), hoop_increment(hoops, nodal))
-    };
-    let (gradients, hoops) =
-        (&step.influences.gradients[row.clone()], &step.influences.hoop[row.clone()]);
-    let (block, hoop) = increment(gradients, hoops);
-    let centres = step.influences.centre_gradients.get(row.clone());
-    let centre_hoops = step.influences.centre_hoop.get(row).unwrap_or_default();
-    let middle = centres.map(|centres| increment(centres, centre_hoops));
-    let own = Increment { block: &block, hoop };
-    let middle = middle.as_ref().map(|(block, hoop)| Increment { block, hoop: *hoop });
-    let (made, ring) = respond_ring(step, frame, p, own, middle, health)?;
+    let (gradients, hoops) = (&step.influences.gradients[row.clone()], &step.influences.hoop[row]);
+    let block = displacement_gradient(gradients, nodal);
+    let cells = cells(step.influences, p, nodal);
+    let common = (!cells.is_empty()).then(|| change_of(&cells));
+    let own = Increment { block: &block, hoop: hoop_increment(hoops, nodal) };
+    let (made, ring) = respond_ring(step, frame, p, own, common, health)?;
     let mapped = |a: usize, j: usize| -> f64 {
         (0..D).map(|i| gradients[a][i] * made.gradient_map[i][j]).sum()
     };
@@ -184,11 +246,10 @@ fn ring<const D: usize>(
             }
         }
     }
-    if let (Some(dilation), Some(centres)) = (&ring.dilation, centres) {
+    if let Some(dilation) = &ring.dilation {
         let frame = |a: usize| (std::array::from_fn(|j| mapped(a, j)), hoops[a] * ring.map);
-        let rows =
-            |a: usize| dilation.rows((&gradients[a], hoops[a]), (&centres[a], centre_hoops[a]));
-        dilate(dilation, volume, (nodes, frame, rows), force, &mut block);
+        let own = |a: usize| dilation.own((&gradients[a], hoops[a]));
+        dilate(dilation, volume, (nodes, frame, own, &cells), force, &mut block);
     }
     Some(block)
 }

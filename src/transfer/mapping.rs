@@ -8,8 +8,9 @@ use std::ops::Range;
 use crate::basis::Influences;
 use crate::mechanics::{Increment, dilation};
 use crate::points::Points;
+use crate::system::cell_rows::rows_now;
 use crate::system::numbering::Numbering;
-use crate::system::terms::stress::{StepPoints, displacement_gradient, hoop_increment};
+use crate::system::terms::stress::StepPoints;
 use crate::tensor::Square;
 use crate::tensor::dense;
 
@@ -19,8 +20,9 @@ pub struct Deformation<const D: usize> {
     pub blocks: Vec<Square<D>>,
     /// dF_zz - 1 of rings; empty without axisymmetry.
     pub hoops: Vec<f64>,
-    /// dF_0 - 1 of the points' cells, with the hoop's; empty without F-bar, and where no force needs it.
-    pub common: Vec<(Square<D>, f64)>,
+    /// Rows g_0 of the points' cells after it, with the hoops', of all entries of the influences; empty without F-bar,
+    /// and where no force needs them.
+    pub common: Vec<([f64; D], f64)>,
 }
 
 /// Σ_p m S^T v (Ghost eq. 10), kg m/s.
@@ -174,15 +176,14 @@ fn add_dilation_force<const D: usize>(
         let hoop = increments.hoops.get(p).copied().unwrap_or(0.0);
         let block = increments.blocks.get(p).unwrap_or(&still);
         let here = dilation::inverse(Increment { block, hoop });
-        let (block, hoop) = increments.common.get(p).copied().unwrap_or((still, 0.0));
-        let common = dilation::inverse(Increment { block: &block, hoop });
         for (&node, at) in step.nodes_of(p).iter().zip(influences.row(p)) {
             let hoops = match rings {
                 true => [influences.hoop[at], influences.centre_hoop[at]],
                 false => [0.0; 2],
             };
             let own = dilation::mapped((&influences.gradients[at], hoops[0]), &here);
-            let cells = dilation::mapped((&influences.centre_gradients[at], hoops[1]), &common);
+            let still = (influences.centre_gradients[at], hoops[1]);
+            let cells = increments.common.get(at).copied().unwrap_or(still);
             let row = dilation::swelling(&own, &cells, 1.0 / directions as f64);
             for (sum, r) in sums[node as usize].iter_mut().zip(row) {
                 *sum -= pressure * r;
@@ -344,26 +345,31 @@ pub fn displacement_gradients<const D: usize>(
     Deformation { blocks, hoops, common: Vec::new() }
 }
 
-/// dF_0 - 1 of each point's cells, with the hoop's; empty without F-bar.
-pub fn common_increments<const D: usize>(
+/// det dF_0 - 1 of each point's cells, with the hoop; empty without F-bar. `rows` takes their g_0 of all entries of
+/// the influences.
+pub fn common_changes<const D: usize>(
     step: StepPoints<'_, D>,
     displacement: &[f64],
-) -> Vec<(Square<D>, f64)> {
+    mut rows: Option<&mut Vec<([f64; D], f64)>>,
+) -> Vec<f64> {
     let influences = step.influences;
     if influences.centre_gradients.is_empty() {
         return Vec::new();
     }
-    let of_point = |p: usize| {
-        let (nodes, row) = (step.nodes_of(p), influences.row(p));
+    let mut of_point = Vec::new();
+    let change = |p: usize| {
+        let nodes = step.nodes_of(p);
         let nodal = |a: usize| -> [f64; D] {
             let start = nodes[a] as usize * D;
             std::array::from_fn(|i| displacement[start + i])
         };
-        let block = displacement_gradient(&influences.centre_gradients[row.clone()], nodal);
-        let hoops = influences.centre_hoop.get(row).unwrap_or_default();
-        (block, hoop_increment(hoops, nodal))
+        let change = rows_now(influences, p, nodal, &mut of_point);
+        if let Some(rows) = rows.as_deref_mut() {
+            rows.extend_from_slice(&of_point);
+        }
+        change
     };
-    (0..step.points.len()).map(of_point).collect()
+    (0..step.points.len()).map(change).collect()
 }
 
 #[cfg(test)]

@@ -93,26 +93,20 @@ pub fn increments<const D: usize>(step: StepPoints<'_, D>, displacement: &[f64])
         made.deformation.hoops = mapping::hoop_increments(step, displacement);
         made.displacement = mapping::displacements_of_rings(step, displacement);
     }
-    made.averaged = averaged(step, displacement, &made.deformation);
+    let common = mapping::common_changes(step, displacement, None);
+    made.averaged = averaged(&common, &made.deformation);
     made
 }
 
-/// dF_bar - 1 at each point, from the increments that made `deformation`; empty without F-bar.
-pub fn averaged<const D: usize>(
-    step: StepPoints<'_, D>,
-    displacement: &[f64],
-    deformation: &Deformation<D>,
-) -> Deformation<D> {
+/// dF_bar - 1 at each point, from det dF_0 - 1 of its cells ([`mapping::common_changes`]); empty without F-bar.
+pub fn averaged<const D: usize>(common: &[f64], deformation: &Deformation<D>) -> Deformation<D> {
     let mut made = Deformation::default();
-    let common = mapping::common_increments(step, displacement);
-    for ((own, centre), p) in deformation.blocks.iter().zip(&common).zip(0..) {
+    for ((own, &common), p) in deformation.blocks.iter().zip(common).zip(0..) {
         let Some(&hoop) = deformation.hoops.get(p) else {
-            made.blocks.push(dilation::averaged(own, &centre.0));
+            made.blocks.push(dilation::within(own, common));
             continue;
         };
-        let own = Increment { block: own, hoop };
-        let centre = Increment { block: &centre.0, hoop: centre.1 };
-        let (block, hoop) = ring::averaged(own, dilation::volume_change(centre));
+        let (block, hoop) = ring::averaged(Increment { block: own, hoop }, common);
         made.blocks.push(block);
         made.hoops.push(hoop);
     }

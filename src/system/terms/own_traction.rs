@@ -4,6 +4,8 @@
 use crate::deck::model::Frame;
 use crate::tensor::dense::{self, Square};
 
+use crate::system::cell_rows::{Now, rows_now};
+
 use super::stress::{StepPoints, displacement_gradient, respond, respond_averaged};
 use super::term::Health;
 
@@ -19,27 +21,25 @@ pub fn on_area<const D: usize>(
     wanted: bool,
 ) -> ([f64; D], Vec<Square<D>>) {
     let row = step.influences.row(p);
-    let gradients = &step.influences.gradients[row.clone()];
+    let gradients = &step.influences.gradients[row];
     let moved =
         |a: usize| -> [f64; D] { std::array::from_fn(|i| displacement[nodes[a] as usize * D + i]) };
     let increment = displacement_gradient(gradients, moved);
     let mut health = Health::default();
-    let all_centres = &step.influences.centre_gradients;
-    let (found, expansion) = if all_centres.is_empty() {
+    let (found, expansion) = if step.influences.centre_gradients.is_empty() {
         (respond(step, Frame::Previous, p, &increment, &mut health), Vec::new())
     } else {
-        let centres = &all_centres[row];
-        let centre = displacement_gradient(centres, moved);
-        let made = respond_averaged(step, Frame::Previous, p, [&increment, &centre], &mut health);
-        match made {
+        let mut cells = Vec::new();
+        let common = rows_now(step.influences, p, moved, &mut cells);
+        match respond_averaged(step, Frame::Previous, p, &increment, common, &mut health) {
             None => (None, Vec::new()),
             Some((contribution, dilation)) => {
                 let rate = dense::apply(&dilation.moduli.rate, area);
-                let of_node = |(g, c): (&[f64; D], &[f64; D])| -> Square<D> {
-                    let row = dilation.rows((g, 0.0), (c, 0.0)).swelling;
+                let of_node = |(g, cells): (&[f64; D], &Now<D>)| -> Square<D> {
+                    let row = dilation.swelling(&dilation.own((g, 0.0)), cells);
                     std::array::from_fn(|i| row.map(|r| rate[i] * r))
                 };
-                (Some(contribution), gradients.iter().zip(centres).map(of_node).collect())
+                (Some(contribution), gradients.iter().zip(&cells).map(of_node).collect())
             }
         }
     };

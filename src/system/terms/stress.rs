@@ -21,6 +21,8 @@ use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockRows;
 
+pub use crate::mechanics::{displacement_gradient, hoop_increment};
+
 use super::term::{At, Health, Part, Term};
 
 /// What a step's points look like to the equations: fixed while the step is solved.
@@ -241,6 +243,7 @@ impl<const D: usize> Task<'_, D> {
             work.force.resize(nodes.len(), [0.0; D]);
             let rings = !self.step.influences.hoop.is_empty();
             work.batch.start::<D>(nodes.len(), rings, CELLS);
+            work.cells.start();
             if let Some(matrix) = stiffness.as_deref_mut() {
                 self.find_rows(nodes, matrix, &mut work.rows);
             }
@@ -255,6 +258,13 @@ impl<const D: usize> Task<'_, D> {
             }
             if CELLS {
                 self.leave_cells::<FUSED>(&mut work, stiffness.is_some());
+                for number in 0..work.cells.several.len() {
+                    let Some(matrix) = stiffness.as_deref_mut() else { break };
+                    if work.batch.is_full() {
+                        self.flush::<FUSED, R>(group, &mut work, Some(matrix));
+                    }
+                    work.batch.push_cell::<D>(&work.cells.several[number]);
+                }
             }
             self.flush::<FUSED, R>(group, &mut work, stiffness.as_deref_mut());
             for (&node, sum) in nodes.iter().zip(&work.force) {
@@ -367,11 +377,7 @@ impl<const D: usize> Task<'_, D> {
         let row = influences.row(p);
         if !work.cells.has(influences, &row) {
             self.leave_cells::<FUSED>(work, with_block);
-            let nodal = |a: usize| work.displacement[a];
-            let block = displacement_gradient(&influences.centre_gradients[row.clone()], nodal);
-            let hoops = influences.centre_hoop.get(row.clone()).unwrap_or_default();
-            let increment = Increment { block: &block, hoop: hoop_increment(hoops, nodal) };
-            work.cells.enter(influences, row, increment);
+            work.cells.enter(influences, p, &work.displacement);
         }
     }
 
@@ -453,17 +459,17 @@ pub(crate) fn respond<const D: usize>(
     sound(p, increment.into(), &state, health).then_some(contribution)
 }
 
-/// [`respond`] of a ring, with F-bar where dF_0 - 1 at the `centre` of cells is given.
+/// [`respond`] of a ring, with F-bar where det dF_0 - 1 is given.
 pub(crate) fn respond_ring<const D: usize>(
     step: StepPoints<'_, D>,
     frame: Frame,
     p: usize,
     increment: Increment<'_, D>,
-    centre: Option<Increment<'_, D>>,
+    common: Option<f64>,
     health: &mut Health,
 ) -> Option<(Contribution<D>, Hoop<D>)> {
     let (contribution, hoop, state) =
-        mechanics::ring_contribution(frame, &start(step, p), increment, centre);
+        mechanics::ring_contribution(frame, &start(step, p), increment, common);
     sound(p, increment, &state, health).then_some((contribution, hoop))
 }
 
@@ -501,16 +507,17 @@ fn respond_shared<const D: usize>(
     sound(p, increment.into(), &state, health).then_some((contribution, share))
 }
 
-/// [`respond`] with F-bar as the formulas read, to dF - 1 and dF_0 - 1 of its cells.
+/// [`respond`] with F-bar as the formulas read, to dF - 1 and det dF_0 - 1 of its cells.
 pub(crate) fn respond_averaged<const D: usize>(
     step: StepPoints<'_, D>,
     frame: Frame,
     p: usize,
-    [increment, centre]: [&[[f64; D]; D]; 2],
+    increment: &[[f64; D]; D],
+    common: f64,
     health: &mut Health,
 ) -> Option<(Contribution<D>, Dilation<D>)> {
     let (contribution, dilation, state) =
-        mechanics::averaged_contribution(frame, &start(step, p), increment, centre);
+        mechanics::averaged_contribution(frame, &start(step, p), increment, common);
     sound(p, increment.into(), &state, health).then_some((contribution, dilation))
 }
 
@@ -563,32 +570,4 @@ fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
     let gradient = &points.deformation_gradient[p];
     let hoop = if D == 2 { gradient[(2, 2)] } else { 1.0 };
     points.volume_initial[p] * ratio * hoop / gradient.determinant()
-}
-
-/// dF_zz - 1 = Σ_a H_a u_ar of a ring ([`crate::basis::radial`]).
-#[inline]
-pub fn hoop_increment<const D: usize>(
-    rows: &[f64],
-    displacement: impl Fn(usize) -> [f64; D],
-) -> f64 {
-    rows.iter().enumerate().map(|(a, row)| row * displacement(a)[0]).sum()
-}
-
-/// dF - 1 = Σ_a u_a ⊗ dS_a/dX~ (Lagrangian eq. 7): without the unit, in which small gradients
-/// would lose their digits.
-#[inline]
-pub fn displacement_gradient<const D: usize>(
-    gradients: &[[f64; D]],
-    displacement: impl Fn(usize) -> [f64; D],
-) -> [[f64; D]; D] {
-    let mut increment = [[0.0; D]; D];
-    for (a, gradient) in gradients.iter().enumerate() {
-        let u = displacement(a);
-        for i in 0..D {
-            for j in 0..D {
-                increment[i][j] += u[i] * gradient[j];
-            }
-        }
-    }
-    increment
 }
