@@ -2,6 +2,7 @@
 
 #![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
 
+use super::tests::tangent_error;
 use super::{CATALOGUE, Material, Response};
 
 const YOUNG: f64 = 1e5;
@@ -76,24 +77,8 @@ fn tangents_are_those_of_differences() {
             for trial in TRIALS {
                 let response = law.respond(trial, &[start]);
                 falling += usize::from(response.state[0] > start && start < 0.02);
-                let step = 1e-9;
-                for b in 0..3 {
-                    let beside = |by: f64| {
-                        let mut strain = trial;
-                        strain[b] += by;
-                        law.respond(strain, &[start]).stress
-                    };
-                    let (up, down) = (beside(step), beside(-step));
-                    for a in 0..3 {
-                        let difference = (up[a] - down[a]) / (2.0 * step);
-                        let off = (response.tangent[a][b] - difference).abs();
-                        assert!(
-                            off < 2e-6 * YOUNG,
-                            "law {number}, {trial:?} from {start}: {a}{b} {} {difference}",
-                            response.tangent[a][b]
-                        );
-                    }
-                }
+                let off = tangent_error(&law, trial, &[start], 1e-9);
+                assert!(off < 2e-6 * YOUNG, "law {number}, {trial:?} from {start}: {off}");
             }
         }
         assert!(falling > 8, "law {number}: {falling}");
