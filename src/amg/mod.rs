@@ -80,7 +80,7 @@ const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
 /// The hierarchy under an assembled system, which may be `symmetric` or not; `ties`: what penalties do to it. `N`
 /// unknowns per node are displacements where space has as many axes; others are smooth where each is constant. `None`
-/// for one or more than three of these, of which there are no products by blocks. Collective.
+/// for one of these, of which there are no products by blocks, and for more than four. Collective.
 pub fn of_system<const D: usize, const N: usize>(
     world: &World,
     grid: &Grid<D>,
@@ -107,6 +107,8 @@ pub fn of_system<const D: usize, const N: usize>(
         (Modes::RigidMotions, _, false) => build_unsymmetric::<N, 6>(world, &nodes, rows, ties),
         (Modes::Constants, 2, true) => build::<N, 2>(world, &nodes, rows, ties),
         (Modes::Constants, 2, false) => build_unsymmetric::<N, 2>(world, &nodes, rows, ties),
+        (Modes::Constants, 4, true) => build::<N, 4>(world, &nodes, rows, ties),
+        (Modes::Constants, 4, false) => build_unsymmetric::<N, 4>(world, &nodes, rows, ties),
         (Modes::Constants, ..) => Ok(None),
     }
 }

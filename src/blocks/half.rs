@@ -38,12 +38,13 @@ macro_rules! by_shape {
 }
 
 impl<T: Stored> Half<T> {
-    /// No rows yet, of `size` unknowns: 2 or a multiple of 3. `blocks`: about how many lower and
+    /// No rows yet, of `size` unknowns: a multiple of 3 or of 2. `blocks`: about how many lower and
     /// diagonal ones there will be.
     pub fn growing(size: usize, blocks: usize) -> Option<Self> {
         let (shape, kept) = match size {
-            2 => (Shape::Two, 2),
-            _ if size > 0 && size.is_multiple_of(3) => (Shape::Three, 3),
+            0 => return None,
+            _ if size.is_multiple_of(3) => (Shape::Three, 3),
+            _ if size.is_multiple_of(2) => (Shape::Two, 2),
             _ => return None,
         };
         Some(Half {

@@ -33,7 +33,7 @@ impl<T: Stored> BlockProduct<T> {
     /// `blocks`: how many there are in all.
     ///
     /// # Panics
-    /// If blocks of this size have no kernel: 2x2, 2x3 and multiples of 3 have.
+    /// If blocks of this size have no kernel: 2x3 and multiples of 2 and of 3 have.
     pub fn collect<const R: usize, const C: usize>(
         rows: usize,
         own_columns: usize,

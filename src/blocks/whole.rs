@@ -37,15 +37,6 @@ impl Shape {
             Shape::TwoByThree => 6,
         }
     }
-
-    fn of(size: [usize; 2]) -> Option<Self> {
-        match size {
-            [2, 2] => Some(Shape::Two),
-            [3, 3] => Some(Shape::Three),
-            [2, 3] => Some(Shape::TwoByThree),
-            _ => None,
-        }
-    }
 }
 
 /// Calls a method for the blocks' rows and columns.
@@ -60,12 +51,15 @@ macro_rules! by_shape {
 }
 
 impl<T: Stored> Blocks<T> {
-    /// No rows yet, in blocks of `size`: 2x2, 2x3, or multiples of 3, which are kept as 3x3.
+    /// No rows yet, in blocks of `size`: 2x3, multiples of 3, which are kept as 3x3, or multiples of 2, as 2x2.
     /// `blocks`: about how many there will be.
     pub fn growing(size: [usize; 2], blocks: usize) -> Option<Growing<T>> {
         let shape = match size {
-            [r, c] if r % 3 == 0 && c % 3 == 0 && r * c > 0 => Shape::Three,
-            _ => Shape::of(size)?,
+            [0, _] | [_, 0] => return None,
+            [2, 3] => Shape::TwoByThree,
+            [r, c] if r % 3 == 0 && c % 3 == 0 => Shape::Three,
+            [r, c] if r % 2 == 0 && c % 2 == 0 => Shape::Two,
+            _ => return None,
         };
         let blocks = Blocks {
             shape,
