@@ -2,7 +2,7 @@
 # Builds the program with other libraries than Debian's default ones and runs the core tests:
 #   int64   Debian's PETSc with 64-bit indices; its packages are unpacked beside the build
 #   newer   PETSc's newest release, from the source package that PyPI carries, with Debian's MUMPS
-#   mpich   the same release without MUMPS, on MPICH and its HDF5; its packages are unpacked, too
+#   mpich   the same release without MUMPS, on MPICH and a serial HDF5; their packages are unpacked, too
 # usage: jobs/portability.sh [int64 | newer | mpich]...      (default: int64 newer)
 #   PLACE=target/portability       where packages, libraries and builds go; nothing is installed
 #   PETSC_RELEASE=3.26.1           which release `newer` and `mpich` take
@@ -87,7 +87,7 @@ unpacked() {
 
 mpich() {
   local root=$place/mpich-root
-  unpacked mpich-root mpich libmpich-dev libmpich12 libhdf5-mpich-dev libhdf5-mpich-103-1 libslurm38
+  unpacked mpich-root mpich libmpich-dev libmpich12 libslurm38 libhdf5-dev libhdf5-103-1
   # The compiler's wrapper and the starter, for the place they are in. What starts runs in scripts and
   # tests is Open MPI's mpirun with its words.
   mkdir -p "$place/bin"
@@ -108,7 +108,7 @@ SCRIPT
   chmod +x "$place"/bin/mpi*
   # Its own library of MPI first, then what the packages ask of the system.
   export LD_LIBRARY_PATH=$root/usr/lib/$machine${LD_LIBRARY_PATH:+:$LD_LIBRARY_PATH}
-  export PATH=$place/bin:$PATH MPICC=$place/bin/mpicc.mpich HDF5_DIR=$root/usr/lib/$machine/hdf5/mpich
+  export PATH=$place/bin:$PATH MPICC=$place/bin/mpicc.mpich HDF5_DIR=$root/usr/lib/$machine/hdf5/serial
   library mpich --with-cc="$MPICC" --with-fc=0 --with-sowing=0
   trial mpich
 }

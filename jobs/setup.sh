@@ -19,7 +19,7 @@ command -v cargo >/dev/null 2>&1 ||
     fail "cargo is missing: install Rust 1.89 or newer from https://rustup.rs, then repeat"
 
 command -v dpkg-query >/dev/null 2>&1 || fail "this is not a Debian system. Install PETSc 3.18 to 3.26 (real \
-scalars), MPI, parallel HDF5 1.10 or newer, METIS 5, libclang and pkg-config by its \
+scalars), MPI, HDF5 1.10 or newer, METIS 5, libclang and pkg-config by its \
 own means, then set MPM_PAR_SKIP_SETUP=1"
 
 missing=

@@ -157,6 +157,82 @@ gravity = [0, 0, -9.81]
     }
 }
 
+/// A beam thinner than two cells is too stiff, and says so: beside Timoshenko's beam, in plane strain.
+#[test]
+fn a_body_too_thin_to_bend_is_told() {
+    let deck = |thickness: f64| {
+        format!(
+            r#"
+[analysis]
+type = "quasi-static"
+steps = 1
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+size = [10, 5]
+h = 0.5
+[material.steel]
+model = "hencky"
+young = 1e9
+poisson = 0.2
+[[body]]
+name = "beam"
+material = "steel"
+density = 1
+shape = {{ box = {{ min = [0, 1.1], max = [8, {}] }} }}
+[[boundary]]
+where = {{ side = "left" }}
+fix = ["x", "y"]
+[[load]]
+gravity = [0, -1]
+[[probe]]
+name = "tip"
+near = [8, {}]
+fields = ["displacement.y"]
+"#,
+            1.1 + thickness,
+            1.1 + 0.5 * thickness
+        )
+    };
+    // Thickness over h, and the bounds of exact over computed deflection.
+    for (thickness, bounds, told) in [
+        (0.1, 11.0..13.0, true),
+        (0.25, 2.1..2.5, true),
+        (0.5, 1.2..1.3, true),
+        (1.0, 1.04..1.08, false),
+    ] {
+        let outcome = Run::text(&deck(thickness)).attempt();
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        let said = outcome.stdout.clone();
+        let (plane, shear) = (1e9 / (1.0 - 0.04), 1e9 / 2.4);
+        let bending = 8f64.powi(4) / (8.0 * plane * thickness * thickness / 12.0);
+        let exact = -(bending + 8f64.powi(2) / (2.0 * shear * 5.0 / 6.0));
+        let probes = outcome.results().text("probes.csv");
+        let tip: f64 = probes.lines().last().unwrap().rsplit(',').next().unwrap().parse().unwrap();
+        let stiffer = exact / tip;
+        assert!(bounds.contains(&stiffer), "{thickness}: {stiffer}");
+        assert_eq!(said.contains("cells thick"), told, "{thickness}: {said}");
+    }
+    let said = |deck: &str| Run::text(deck).word("--check").attempt().stdout;
+    // Upright in the ground: the wall carries, and a layer of the ground is carried.
+    let wall = |young: &str| {
+        deck(0.1)
+            + "[[body]]\nname = \"ground\"\nmaterial = \"soil\"\ndensity = 1\n\
+            shape = { box = { min = [0, 0], max = [8, 1.1] } }\n\
+            [material.soil]\nmodel = \"hencky\"\npoisson = 0.3\nyoung = "
+            + young
+            + "\n"
+    };
+    assert!(said(&wall("1e7")).contains("body \"beam\" is 0.2 cells thick"));
+    assert!(!said(&wall("1e9")).contains("cells thick"));
+    // Between walls nothing bends.
+    let bar = deck(0.5).replace("[0, 1.1]", "[0, 0]").replace("size = [10, 5]", "size = [10, 0.5]");
+    let bar = bar.replace("[8, 1.6]", "[8, 0.5]").replace("[8, 1.35]", "[8, 0.25]")
+        + "[[boundary]]\nwhere = { side = \"bottom\" }\nfix = [\"y\"]\n";
+    assert!(!said(&bar).contains("cells thick"), "{}", said(&bar));
+}
+
 /// Mistakes on the command line.
 #[test]
 fn mistakes_of_the_command_line_are_explained() {

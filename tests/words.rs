@@ -78,7 +78,9 @@ fn a_new_deck_is_written_once() {
     let file = std::fs::File::create(folder.path().join("mine.toml")).unwrap();
     let mut command = Command::new(env!("CARGO_BIN_EXE_mpm-par"));
     command.args(["--new", "beam"]).current_dir(folder.path()).stdout(file);
-    assert!(command.status().unwrap().success());
+    let output = command.output().unwrap();
+    assert!(output.status.success());
+    assert!(String::from_utf8_lossy(&output.stderr).contains("beam.toml was not written"));
     assert!(std::fs::read_to_string(folder.path().join("mine.toml")).unwrap().contains("[grid]"));
     assert!(!folder.path().join("beam.toml").exists());
 }

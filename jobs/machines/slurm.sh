@@ -1,7 +1,7 @@
 # A cluster whose Slurm starts MPI itself. Copy this file, name it after the machine, load its
 # modules here, and set MACHINE to its name.
 #
-# module load petsc hdf5-parallel metis
+# module load petsc hdf5 metis
 
 launch() {
     ranks=$1

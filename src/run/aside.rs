@@ -125,10 +125,15 @@ fn write_deck(template: &Template, force: bool) -> Result<()> {
     if !stdout.is_terminal() {
         print(template.text.trim_end())?;
     }
+    let path = PathBuf::from(format!("{}.toml", template.name));
     if redirected {
+        let _ = writeln!(
+            std::io::stderr(),
+            "the deck went to standard output, which is a file: {} was not written",
+            path.display()
+        );
         return Ok(());
     }
-    let path = PathBuf::from(format!("{}.toml", template.name));
     let opened =
         OpenOptions::new().write(true).create(true).create_new(!force).truncate(true).open(&path);
     let written = opened.and_then(|mut file| file.write_all(template.text.as_bytes()));

@@ -11,7 +11,7 @@ use crate::system::model::Model;
 use crate::system::numbering::Numbering;
 use crate::system::populated::Populated;
 
-use super::{locking, plan_checks};
+use super::{locking, plan_checks, thin};
 
 /// Counts the first step's system from its cells and nodes ([`crate::system::step_system::active`]).
 /// Collective.
@@ -42,6 +42,7 @@ pub fn of<const D: usize>(
     warnings.push(plan_checks::unstable_step(world, model, points));
     warnings.push(plan_checks::much_output(output, frames));
     warnings.push(locking::warning(world, model, points));
+    warnings.push(thin::warning(world, model, points));
     Plan {
         title: deck.title.clone(),
         facts,

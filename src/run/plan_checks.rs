@@ -88,10 +88,11 @@ pub fn weight_ratios<const D: usize>(
     if size == 0.0 {
         return Vec::new();
     }
-    let heights = heights(world, model, points, gravity.map(|g| g / size));
+    let along = extents(world, model, points, gravity.map(|g| g / size));
     let mut rows = Vec::new();
     for (index, body) in model.deck.bodies.iter().enumerate() {
-        let weight = body.density * size * heights[index];
+        let height = along[index][1] - along[index][0];
+        let weight = body.density * size * height;
         let young = model.stiffness[index];
         // A body that is not there yet has no height.
         if weight == 0.0 || young == 0.0 || !weight.is_finite() {
@@ -100,8 +101,7 @@ pub fn weight_ratios<const D: usize>(
         let of_young = weight / young;
         let varies = model.deck.materials[body.material].varies();
         let strength = if varies { None } else { model.materials[index].strength() };
-        let mut text =
-            format!("rho g H / E = {} with H = {} m", rough(of_young), rough(heights[index]));
+        let mut text = format!("rho g H / E = {} with H = {} m", rough(of_young), rough(height));
         if let Some(strength) = strength {
             text.push_str(&format!(", rho g H / strength = {}", rough(weight / strength)));
         }
@@ -160,13 +160,13 @@ fn unusual(what: &str, value: f64, [low, high]: [f64; 2]) -> Option<String> {
         .then(|| format!("{what} = {} is far from usual values ({low:e} to {high})", rough(value)))
 }
 
-/// Extent of each body along a direction, m. Collective.
-fn heights<const D: usize>(
+/// From where to where each body reaches along a direction, m. Collective.
+pub fn extents<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
     direction: [f64; D],
-) -> Vec<f64> {
+) -> Vec<[f64; 2]> {
     let bodies = model.deck.bodies.len();
     let (mut low, mut high) = (vec![f64::INFINITY; bodies], vec![f64::NEG_INFINITY; bodies]);
     for p in 0..points.len() {
@@ -177,8 +177,7 @@ fn heights<const D: usize>(
         low[body] = low[body].min(along - reach);
         high[body] = high[body].max(along + reach);
     }
-    let height = |body: usize| world.max(high[body]) - world.min(low[body]);
-    (0..bodies).map(height).collect()
+    (0..bodies).map(|body| [world.min(low[body]), world.max(high[body])]).collect()
 }
 
 /// The time step and the number of steps. Collective.

@@ -17,7 +17,7 @@ class MpmPar(CargoPackage):
     depends_on("llvm+clang", type="build")
     depends_on("mpi")
     depends_on("petsc@3.18:3.26 +mpi+mumps~complex")
-    depends_on("hdf5@1.10: +mpi")
+    depends_on("hdf5@1.10:")
     depends_on("metis@5:")
 
     def setup_build_environment(self, env):

@@ -1,6 +1,8 @@
-//! Collective HDF5: the thin safe wall around files that all ranks read together.
+//! HDF5 files that all ranks read: the thin safe wall around its calls.
 //!
-//! A dataset is a table of rows; every rank takes the rows it wants in calls that all ranks make.
+//! A dataset is a table of rows; every rank takes the rows it wants in calls that all ranks make, and all
+//! of them learn of a fault of one. Each opens the file for itself, so that a serial HDF5 serves as well
+//! as a parallel one.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -10,20 +12,17 @@ use hdf5::H5Type;
 use hdf5_sys::h5::hsize_t;
 use hdf5_sys::h5d::H5Dread;
 use hdf5_sys::h5i::hid_t;
-use hdf5_sys::h5p::{
-    H5FD_mpio_xfer_t, H5P_CLS_DATASET_XFER, H5Pclose, H5Pcreate, H5Pset_dxpl_mpio,
-};
+use hdf5_sys::h5p::H5P_DEFAULT;
 use hdf5_sys::h5s::{
     H5S_seloper_t, H5Sclose, H5Screate_simple, H5Sselect_hyperslab, H5Sselect_none,
 };
 use mpi::topology::SimpleCommunicator;
-use mpi::traits::AsRaw;
 
 use crate::error::{Error, Result};
 use crate::output::agreement::{all_agree, on_root};
 use crate::output::whole_file::cannot_read;
 
-/// A file that all ranks of `comm` read together; drop it before MPI is finalised.
+/// A file that all ranks of `comm` read.
 pub struct FileReader<'c> {
     file: hdf5::File,
     path: PathBuf,
@@ -36,9 +35,7 @@ impl<'c> FileReader<'c> {
         on_root(comm, || {
             fs::File::open(path).map(drop).map_err(|reason| cannot_read(path, &reason))
         })?;
-        let file = hdf5::File::with_options()
-            .with_fapl(|p| p.mpio(comm.as_raw(), None).all_coll_metadata_ops(true))
-            .open(path);
+        let file = hdf5::File::open(path);
         let this = |file| Self { file, path: path.to_path_buf(), comm };
         accept(comm, file, |reason| {
             Error::File(format!("{} is not a readable HDF5 file: {reason}", path.display()))
@@ -86,11 +83,11 @@ impl<'c> FileReader<'c> {
         let outcome = hdf5::Datatype::from_type::<T>().and_then(|kind| {
             let slab = Slab { first, rows, columns, flat: dataset.ndim() == 1 };
             let values = values.as_mut_ptr().cast();
-            slab.transfer(&dataset, |memory, file, transfer| {
-                // SAFETY: the dataset, both dataspaces and the property list are open; `values` has
-                // room for the rows * columns elements of type T that the memory space selects, and
-                // HDF5 converts to T or fails.
-                unsafe { H5Dread(dataset.id(), kind.id(), memory, file, transfer, values) }
+            slab.transfer(&dataset, |memory, file| {
+                // SAFETY: the dataset and both dataspaces are open; `values` has room for the
+                // rows * columns elements of type T that the memory space selects, and HDF5 converts
+                // to T or fails.
+                unsafe { H5Dread(dataset.id(), kind.id(), memory, file, H5P_DEFAULT, values) }
             })
         });
         accept(self.comm, outcome, |reason| read_failed(&self.path, name, reason))?;
@@ -128,11 +125,11 @@ struct Slab {
 }
 
 impl Slab {
-    /// Calls `transfer(memory space, file space, collective property list)`.
+    /// Calls `transfer(memory space, file space)`.
     fn transfer(
         &self,
         dataset: &hdf5::Dataset,
-        transfer: impl FnOnce(hid_t, hid_t, hid_t) -> i32,
+        transfer: impl FnOnce(hid_t, hid_t) -> i32,
     ) -> hdf5::Result<()> {
         let dimensions = if self.flat { 1 } else { 2 };
         let start = [self.first as hsize_t, 0];
@@ -144,8 +141,6 @@ impl Slab {
             unsafe {
                 let memory =
                     Owned::new(H5Screate_simple(dimensions, count.as_ptr(), null()), H5Sclose)?;
-                let list = Owned::new(H5Pcreate(*H5P_CLS_DATASET_XFER), H5Pclose)?;
-                hdf5::h5check(H5Pset_dxpl_mpio(list.id, H5FD_mpio_xfer_t::H5FD_MPIO_COLLECTIVE))?;
                 if self.rows == 0 {
                     hdf5::h5check(H5Sselect_none(space.id()))?;
                     hdf5::h5check(H5Sselect_none(memory.id))?;
@@ -159,7 +154,7 @@ impl Slab {
                         null(),
                     ))?;
                 }
-                hdf5::h5check(transfer(memory.id, space.id(), list.id))?;
+                hdf5::h5check(transfer(memory.id, space.id()))?;
             }
             Ok(())
         })
