@@ -250,45 +250,84 @@ fn discs_bounce_in_implicit_steps() {
     assert!((push / off_wall - 1.0).abs() < 0.02, "{push} {off_wall}");
 }
 
+/// Coulomb's law: as soon as all of the surface slips, the shear is mu N; before, with a rough surface, it is
+/// that of one body on one grid.
+#[test]
+fn pushed_blocks_stick_and_slip() {
+    let run = Run::of("pushed-blocks");
+    let results = run.results();
+    let (shear, down) =
+        (-last(&results, "contact.low-high.x"), last(&results, "contact.low-high.y"));
+    assert!(down > 0.0 && (shear / down / 0.3 - 1.0).abs() < 1e-3, "{shear} {down}");
+    for (name, force) in [("reaction.base.x", -shear), ("reaction.base.y", down)] {
+        let reaction = last(&results, name);
+        assert!((reaction / force - 1.0).abs() < 1e-8, "{name}: {reaction} {force}");
+    }
+    // What friction takes is the shear times the way that was slid, up to what slid before all of it did.
+    let (lost, slid) =
+        (last(&results, "dissipation_friction"), last(&results, "contact.low-high.slip"));
+    assert!((lost / (shear * slid) - 1.0).abs() < 0.05, "{lost} {shear} {slid}");
+    let pushed = |run: Run| last(&run.results(), "reaction.base.x");
+    let rough = run.set("contact.0.friction=\"rough\"").set("contact.0.penalty=100");
+    let text = std::fs::read_to_string(common::run::input("pushed-blocks")).expect("a deck");
+    let joined = Run::text(&text[..text.find("[[contact]]").expect("a contact")]);
+    let (rough, joined) = (pushed(rough), pushed(joined));
+    assert!((rough / joined - 1.0).abs() < 0.02, "{rough} {joined}");
+}
+
 /// Rank boundaries go through the bodies that touch, and a restart repeats the run bit by bit.
 #[test]
 fn ranks_agree_and_a_restart_is_bitwise() {
-    let text = round(0.05)
-        .replace("[[contact]]", "[output]\ncheckpoint = { every = 1, keep = 3 }\n[[contact]]");
-    let run = Run::text(&text).set("parallel.brick=1");
+    let keeping = "[output]\ncheckpoint = { every = 1, keep = 20 }\n[[contact]]";
+    let rubbing = std::fs::read_to_string(common::run::input("pushed-blocks")).expect("a deck");
+    for (text, columns, middle) in [
+        (round(0.05), &["contact.low-high.y", "contact.low-high.area"][..], 2),
+        (rubbing, &["contact.low-high.y", "contact.low-high.x", "dissipation_friction"], 6),
+    ] {
+        let text = text.replace("[[contact]]", keeping);
+        ranks_agree(&text, columns);
+        restart_is_bitwise(&text, middle);
+    }
+}
+
+fn ranks_agree(text: &str, columns: &[&str]) {
+    let run = Run::text(text).set("parallel.brick=1");
     let one = run.results();
     for ranks in [2, 3] {
         let more = run.clone().ranks(ranks).results();
-        for column in
-            ["contact.low-high.y", "contact.low-high.area", "energy_contact", "energy_strain"]
-        {
+        for column in columns.iter().copied().chain(["energy_contact", "energy_strain"]) {
             let wrong = relative_difference(&more.history(column), &one.history(column));
             assert!(wrong < 1e-8, "{ranks} ranks, {column}: {wrong:e}");
         }
     }
+}
+
+fn restart_is_bitwise(text: &str, middle: usize) {
     let folder = tempfile::tempdir().expect("a scratch folder");
     let deck = folder.path().join("deck.toml");
     std::fs::write(&deck, text).expect("a deck");
     for ranks in [1, 2] {
         let at = |name: &str| folder.path().join(format!("{name}-{ranks}"));
         program::run_well(ranks, &deck, &at("whole"), &[]);
-        let middle = at("whole").join("checkpoint-000002.h5").display().to_string();
-        program::run_well(ranks, &deck, &at("part"), &["--restart", &middle]);
-        assert_eq!(program::history(&at("part"))[..], program::history(&at("whole"))[2..]);
+        let from = at("whole").join(format!("checkpoint-{middle:06}.h5")).display().to_string();
+        program::run_well(ranks, &deck, &at("part"), &["--restart", &from]);
+        assert_eq!(program::history(&at("part"))[..], program::history(&at("whole"))[middle..]);
     }
 }
 
 fn tangents(universe: &Universe) {
     let world = World::new(universe.world().duplicate());
-    for basis in ["gimp", "mpm", "cpdi2"] {
-        tangent::<2>(&world, basis);
+    for friction in ["0.0", "0.05", "0.4", "\"rough\""] {
+        for basis in ["gimp", "mpm", "cpdi2"] {
+            tangent::<2>(&world, basis, friction);
+        }
+        tangent::<3>(&world, "gimp", friction);
     }
-    tangent::<3>(&world, "gimp");
 }
 
 /// The tangent times a direction is the central difference of the force, and the forces on both bodies
 /// are opposite, in sum and in moment.
-fn tangent<const D: usize>(world: &World, basis: &str) {
+fn tangent<const D: usize>(world: &World, basis: &str, friction: &str) {
     let list = |value: f64| format!("{:?}", vec![value; D]);
     let (mut top, mut bottom) = (vec![2.9; D], vec![0.4; D]);
     (top[D - 1], bottom[D - 1]) = (1.4, 1.4);
@@ -298,7 +337,7 @@ fn tangent<const D: usize>(world: &World, basis: &str) {
          [material.m]\nmodel = \"hencky\"\nyoung = 1e6\npoisson = 0.3\n\
          [[body]]\nname = \"a\"\nmaterial = \"m\"\nshape = {{ box = {{ min = {}, max = {top:?} }} }}\n\
          [[body]]\nname = \"b\"\nmaterial = \"m\"\nshape = {{ box = {{ min = {bottom:?}, max = {} }} }}\n\
-         [[contact]]\nbetween = [\"a\", \"b\"]\n",
+         [[contact]]\nbetween = [\"a\", \"b\"]\nfriction = {friction}\n",
         list(-1.0),
         list(5.0),
         list(0.2),
@@ -319,7 +358,7 @@ fn tangent<const D: usize>(world: &World, basis: &str) {
         };
         (0..count).map(of).collect()
     };
-    let term = FacingTerm::new(&model, &mesh).expect("bodies that face each other");
+    let term = FacingTerm::new(&model, &mesh, &points).expect("bodies that face each other");
     let force = |u: &[f64], mut matrix: Option<&mut BlockMatrix<D>>| {
         let mut force = vec![0.0; count];
         for part in [Part::Reaching, Part::Inner] {
@@ -340,13 +379,16 @@ fn tangent<const D: usize>(world: &World, basis: &str) {
             sums[3 + i] += x[i] * f[j] - x[j] * f[i];
         }
     }
-    assert!(sums.iter().all(|sum| sum.abs() < 1e-12 * size), "{D}D {basis}: {sums:?} of {size}");
+    assert!(
+        sums.iter().all(|sum| sum.abs() < 1e-12 * size),
+        "{D}D {basis}, friction {friction}: {sums:?} of {size}"
+    );
     let along = product(pattern, &matrix, &v);
     let (more, less) = (force(&at(1e-7), None), force(&at(-1e-7), None));
     let size = along.iter().fold(0.0f64, |m, k| m.max(k.abs()));
     for dof in 0..count {
         let error = ((more[dof] - less[dof]) / 2e-7 - along[dof]).abs() / size;
-        assert!(error < 1e-6, "{D}D {basis}: {error:e}");
+        assert!(error < 1e-6, "{D}D {basis}, friction {friction}: {error:e}");
     }
 }
 
@@ -361,17 +403,7 @@ fn what_two_bodies_cannot_do_in_implicit_runs_is_told_with_the_cure() {
                  shape = { box = { min = [0.5, 0.7], max = [0.6, 0.8] } }\noverlap = \"allow\"\n\
                  [[contact]]";
     for (from, to, expected) in [
-        (
-            "between = [\"low\", \"high\"]",
-            "between = [\"low\", \"high\"]\nfriction = 0.3",
-            &["friction", "explicit"][..],
-        ),
-        (
-            "between = [\"low\", \"high\"]",
-            "between = [\"low\", \"high\"]\nadhesion = 3.0",
-            &["adhesion", "[[rigid]]"],
-        ),
-        ("[[contact]]", third, &["by way of \"third\"", "name it in contacts"]),
+        ("[[contact]]", third, &["by way of \"third\"", "name it in contacts"][..]),
         (
             "{ disc = { centre = [0, 2], radius = 2 } }",
             "{ where = \"x^2 + (y-2)^2 < 4\" }",

@@ -10,7 +10,7 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::terms::following::Following;
 use crate::system::terms::stress::StepPoints;
-use crate::system::terms::touching;
+use crate::system::terms::touching::{self, OfBodies};
 
 use super::explicit_bodies::{AtNodes, meet};
 use super::explicit_contact::ContactSteps;
@@ -187,7 +187,7 @@ pub(crate) fn advance<const D: usize>(
             update::respond(&model.materials, made.straining(), points, Some(before))
         });
         update::move_points(&made.displacement, points, Some(before));
-        let of_bodies = std::mem::take(&mut told);
+        let of_bodies = OfBodies { told: std::mem::take(&mut told), slips: Vec::new() };
         touching::keep(&model.contacts, touching.as_ref(), of_bodies, points, Some(before));
         before.velocity.replace(&mut points.velocity, new_velocity);
         before.acceleration.replace(&mut points.acceleration, rate);

@@ -118,7 +118,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             loads.nodes_start.resize(mesh.numbering.len() * D, 0.0);
             contact.add_force_at_start(&mut loads.nodes_start);
         }
-        let facing = FacingTerm::new(model, &mesh);
+        let facing = FacingTerm::new(model, &mesh, points);
         if let (Some(facing), Some(_)) = (&facing, &self.dynamics) {
             loads.nodes_start.resize(mesh.numbering.len() * D, 0.0);
             facing.add_force_at_start(&mut loads.nodes_start);
@@ -201,8 +201,9 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             None => (out_of_balance, [solved.internal_start, solved.internal]),
         };
         let touching = contact.map(|contact| contact.finish(&displacement, shares));
-        let (met, told) =
-            facing.map_or_else(Default::default, |facing| facing.finish(&displacement, shares));
+        let (met, of_bodies) = facing.map_or_else(Default::default, |facing| {
+            facing.finish(model, points, &displacement, shares)
+        });
         let external = [&loads.external_start[..], &loads.external_end];
         let mut work = work_of_step::<D>(
             conditions,
@@ -222,7 +223,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let updated = update::apply(model, numbering, &displacement, &made, points, kept);
             world.fail_together(updated)?;
             let (done, kept) = (touching.as_ref(), before.as_deref_mut());
-            touching::keep(&model.contacts, done, told, points, kept);
+            touching::keep(&model.contacts, done, of_bodies, points, kept);
             if let (Some(rates), Some(before)) = (of_points, before) {
                 before.velocity.replace(&mut points.velocity, rates.velocity);
                 before.acceleration.replace(&mut points.acceleration, rates.acceleration);

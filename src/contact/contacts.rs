@@ -132,6 +132,7 @@ impl<const D: usize> Contacts<D> {
     /// Whether the tangents of all equal their transposed.
     pub fn symmetric(&self) -> bool {
         self.pairs.iter().all(|pair| pair.law.symmetric())
+            && self.body_pairs.iter().all(|pair| pair.friction == Friction::Smooth)
     }
 
     /// Largest penalty on a body, Pa/m; 0 where it touches nothing.
@@ -142,25 +143,44 @@ impl<const D: usize> Contacts<D> {
 
     /// First word of a contact's elastic slip in the row of a point with so many corners.
     pub fn slot_of(&self, pair: usize, corners: usize) -> usize {
-        let body = self.pairs[pair].body;
-        let earlier = &self.pairs[..pair];
-        let count = earlier.iter().filter(|p| p.body == body && p.law.has_history()).count();
-        count * corners * D
+        self.with_slip(&self.pairs[..pair], self.pairs[pair].body) * corners * D
     }
 
-    /// Names of the words that the points of each body carry: elastic slip, and what they are told.
-    pub fn slip_names(&self, deck: &Deck) -> Vec<Vec<String>> {
-        let corners = if deck.method.basis == Basis::Mpm { 1 } else { 1 << D };
+    /// First word of the elastic slip of an element that a point of `body` with so many corners carries, in
+    /// contact with another body; `carried`: elements that points of this body carry at most.
+    pub fn slot_of_element(
+        &self,
+        (pair, body, element): (usize, usize, usize),
+        (corners, carried): (usize, usize),
+    ) -> usize {
+        let before = self.with_slip(&self.pairs, body) * corners;
+        let earlier = rubbing(&self.body_pairs[..pair], body).count();
+        (before + earlier * carried + element) * D
+    }
+
+    /// How many of some contacts with rigid bodies keep elastic slip with the points of a body.
+    fn with_slip(&self, pairs: &[Pair], body: usize) -> usize {
+        pairs.iter().filter(|pair| pair.body == body && pair.law.has_history()).count()
+    }
+
+    /// Names of the words that the points of each body carry: elastic slip, of contacts with rigid bodies by
+    /// corners and of those with other bodies by elements, of which they carry at most so many (`carried`, 0 in
+    /// explicit runs), and what they are told.
+    pub fn slip_names(&self, deck: &Deck, carried: &[usize]) -> Vec<Vec<String>> {
+        let corners = corners_of(deck.method.basis, D);
+        let words = |name: String, count: usize| {
+            (0..count * D).map(move |k| format!("{name}.{}.{}", k / D, k % D))
+        };
         let of_body = |body: usize| {
             let pairs = self.pairs.iter().enumerate();
             let slips = pairs.filter(|(_, pair)| pair.body == body && pair.law.has_history());
-            let slips = slips.flat_map(|(pair, _)| {
-                (0..corners * D).map(move |k| format!("{pair}.{}.{}", k / D, k % D))
-            });
+            let slips = slips.flat_map(|(pair, _)| words(pair.to_string(), corners));
+            let elements = rubbing(&self.body_pairs, body)
+                .flat_map(|pair| words(format!("body.{}", pair.index), carried[body]));
             let touching = self.pairs.iter().any(|pair| pair.body == body)
                 || self.body_pairs.iter().any(|pair| pair.bodies.contains(&body));
             let told = (self.tells && touching).then(|| told::names(D));
-            slips.chain(told.into_iter().flatten()).collect()
+            slips.chain(elements).chain(told.into_iter().flatten()).collect()
         };
         (0..deck.bodies.len()).map(of_body).collect()
     }
@@ -173,6 +193,18 @@ impl<const D: usize> Contacts<D> {
         };
         self.rigids.iter().map(pose).collect()
     }
+}
+
+/// Those of some pairs of bodies that rub on a body.
+fn rubbing(pairs: &[BodyPair], body: usize) -> impl Iterator<Item = &BodyPair> {
+    let rubs =
+        move |pair: &&BodyPair| pair.bodies.contains(&body) && pair.friction != Friction::Smooth;
+    pairs.iter().filter(rubs)
+}
+
+/// Corners of a point's domain that touch rigid bodies.
+pub fn corners_of(basis: Basis, dimension: usize) -> usize {
+    if basis == Basis::Mpm { 1 } else { 1 << dimension }
 }
 
 /// Fields of implicit runs: bodies that no contact names together move in one field. Error: two bodies

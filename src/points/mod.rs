@@ -56,8 +56,8 @@ macro_rules! point_fields {
             pub state: Named,
             /// Parameters of the body's material where they vary in space.
             pub parameters: Named,
-            /// Elastic slip of contacts with friction, m, corner by corner, in the frame of the rigid
-            /// body.
+            /// Elastic slip of contacts with friction, m: corner by corner in the frame of the rigid
+            /// body, element by element of a surface that faces another body as F^-1 times the slip.
             pub slip: Named,
             /// `velocity_gradient` and `spread` are carried: an affine transfer.
             pub affine: bool,

@@ -52,7 +52,7 @@ pub fn prepare<const D: usize>(world: &World, mut deck: Deck) -> Result<(Model<D
     let materials = materials::of_bodies(&deck);
     materials::equip(world, &deck, &materials, &mut points, Stresses::Initial)?;
     let mut model = model_of(world, deck, grid, partition, materials, found, &points)?;
-    points.slip = Named::zeros(model.contacts.slip_names(&model.deck), points.len());
+    points.slip = Named::zeros(model.slip_names(), points.len());
     let late = late_bodies(&model.deck);
     model.waiting = set_aside(&mut points, &late);
     Ok((model, points))
@@ -139,7 +139,7 @@ pub fn restore<const D: usize>(
     hold_constant_forces(&deck, &mut found, &mut Points::<D>::default());
     let of_all = all.as_ref().unwrap_or(&points);
     let mut model = model_of(world, deck, grid, partition, materials, found, of_all)?;
-    let names = model.contacts.slip_names(&model.deck);
+    let names = model.slip_names();
     let slips = names.iter().any(|names| !names.is_empty());
     if points.slip.names() != names
         && points.slip.differ_in(&names, |name| name.starts_with(PREFIX))
@@ -151,7 +151,7 @@ pub fn restore<const D: usize>(
         return Err(Error::File(what.into()));
     }
     if let Some(mut all) = all {
-        all.slip = Named::zeros(model.contacts.slip_names(&model.deck), all.len());
+        all.slip = Named::zeros(model.slip_names(), all.len());
         let mut counts = vec![0.0; model.deck.bodies.len()];
         points.body.iter().for_each(|&body| counts[body as usize] += 1.0);
         let counts = world.sum_slice(&counts);

@@ -47,6 +47,8 @@ pub struct Carried<const D: usize> {
 pub struct Surface<const D: usize> {
     elements: Vec<Carried<D>>,
     of_carrier: FxHashMap<u64, Range<usize>>,
+    /// Of the elements of one carrier the largest number.
+    most: usize,
 }
 
 impl<const D: usize> Surface<D> {
@@ -58,13 +60,19 @@ impl<const D: usize> Surface<D> {
             of_carrier.entry(*carrier).or_insert(index..index).end = index + 1;
         }
         let elements = carried.into_iter().map(|(_, element)| element).collect();
-        Surface { elements, of_carrier }
+        let most = of_carrier.values().map(Range::len).max().unwrap_or(0);
+        Surface { elements, of_carrier, most }
     }
 
     /// The elements that a point carries.
     #[inline]
     pub fn carried_by(&self, id: u64) -> &[Carried<D>] {
         self.of_carrier.get(&id).map_or(&[], |range| &self.elements[range.clone()])
+    }
+
+    /// How many elements a point carries at most.
+    pub fn most_carried(&self) -> usize {
+        self.most
     }
 
     pub fn elements(&self) -> &[Carried<D>] {

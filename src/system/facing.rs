@@ -3,13 +3,14 @@
 //! Either surface is taken once: each of its elements, at x_s with the area A, meets the nearest element
 //! of the other body, at y with the outward normal n, and bears half of its area, so that both passes
 //! together count the surface once. With the weights w of the nodes of its own carrier and v of those of
-//! the other one, at the foot x_s - g n of x_s,
+//! the other one, at the foot x_s - g n of x_s without friction and at x_s with it,
 //!
 //! g = n·(x_s - y) + n·(Σ w_a u_a - Σ v_b u_b)
 //!
 //! is its gap after the nodal increments u. Both rows of weights reproduce linear fields and the force
-//! acts along n through x_s and its foot: momentum and angular momentum are kept to round-off. n is that
-//! of the step's start; the next step finds it anew.
+//! acts along n through x_s and its foot, or with friction at one place: momentum and angular momentum are
+//! kept to round-off, and bodies that turn together do not slip on each other. n is that of the step's
+//! start; the next step finds it anew.
 
 use rustc_hash::FxHashMap;
 use std::f64::consts::TAU;
@@ -17,6 +18,7 @@ use std::f64::consts::TAU;
 use super::model::Model;
 use super::terms::surface::{area_of, grid_weights, place_of};
 use crate::basis::Influences;
+use crate::contact::law::Friction;
 use crate::deck::model::Basis;
 use crate::error::Result;
 use crate::grid::Grid;
@@ -41,6 +43,8 @@ pub struct Couple<const D: usize> {
     pub of_second: bool,
     /// The point that carries it.
     pub point: usize,
+    /// Its number among those that this point carries.
+    pub element: usize,
     /// Nodes of the fields of both carriers; in the pattern they are local ones.
     pub nodes: Vec<usize>,
     /// w, and -v, of these.
@@ -119,7 +123,9 @@ pub fn find<const D: usize>(
             let grid = grid_weights.then_some(&model.grid);
             let fields = |body: usize, node: usize| model.contacts.fields.node(body, node);
             found.extend(nearest.and_then(|to| {
-                let mut couple = meet(face, to, (reach, model.grid.cell_size()), grid, &fields)?;
+                let sizes = (reach, model.grid.cell_size());
+                let rubs = of.friction != Friction::Smooth;
+                let mut couple = meet(face, to, sizes, (grid, rubs), &fields)?;
                 (couple.pair, couple.of_second) = (pair, side == 1);
                 Some(couple)
             }));
@@ -133,7 +139,7 @@ fn meet<const D: usize>(
     face: &Face<D>,
     to: &Face<D>,
     (reach, cell): (f64, f64),
-    grid: Option<&Grid<D>>,
+    (grid, rubs): (Option<&Grid<D>>, bool),
     fields: &dyn Fn(usize, usize) -> usize,
 ) -> Option<Couple<D>> {
     let size = norm(&to.area);
@@ -145,15 +151,17 @@ fn meet<const D: usize>(
     if !(-DEEPEST * cell..=reach).contains(&gap) || norm(&beside) > BESIDE * extent {
         return None;
     }
-    let foot = std::array::from_fn(|i| face.place[i] - gap * normal[i]);
     let mut nodes: Vec<usize> = face.nodes.iter().map(|&node| fields(face.body, node)).collect();
     nodes.extend(to.nodes.iter().map(|&node| fields(to.body, node)));
     let mut weights = face.weights_at(&face.place, grid);
-    weights.extend(to.weights_at(&foot, grid).into_iter().map(|weight| -weight));
+    let foot = std::array::from_fn(|i| face.place[i] - gap * normal[i]);
+    let met = if rubs { face.place } else { foot };
+    weights.extend(to.weights_at(&met, grid).into_iter().map(|weight| -weight));
     Some(Couple {
         pair: 0,
         of_second: false,
         point: face.point,
+        element: face.id.1,
         nodes,
         weights,
         normal,

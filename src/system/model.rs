@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use crate::contact::Contacts;
+use crate::contact::contacts::corners_of;
 use crate::deck::model::Tangent;
 use crate::deck::{Deck, When};
 use crate::error::Result;
@@ -58,6 +59,27 @@ impl<const D: usize> Model<D> {
     /// Whether anything acts on a body's own surface.
     pub fn acts_on_surfaces(&self) -> bool {
         !self.supports.is_empty() || self.loads.iter().any(|load| load.on_surface().is_some())
+    }
+
+    /// Names of the words of contacts that the points of each body carry.
+    pub fn slip_names(&self) -> Vec<Vec<String>> {
+        let carried: Vec<usize> =
+            (0..self.deck.bodies.len()).map(|body| self.most_carried(body)).collect();
+        self.contacts.slip_names(&self.deck, &carried)
+    }
+
+    /// First word of the elastic slip of an element that a point of a body carries, in contact with another
+    /// body.
+    pub fn slip_slot(&self, pair: usize, body: usize, element: usize) -> usize {
+        let corners = corners_of(self.deck.method.basis, D);
+        let counts = (corners, self.most_carried(body));
+        self.contacts.slot_of_element((pair, body, element), counts)
+    }
+
+    /// How many elements that face other bodies a point of a body carries at most.
+    fn most_carried(&self, body: usize) -> usize {
+        let surface = self.facing.get(body).and_then(|surface| surface.as_ref());
+        surface.map_or(0, |surface| surface.most_carried())
     }
 
     /// Whether the tangent of the equations equals its transposed: all of its parts say so, and the

@@ -107,7 +107,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "contact",
         header: "[[contact]]",
-        doc: "A body on a rigid body: a penalty keeps the corners of the domains of its points (gimp, cpdi1, cpdi2), or its points (mpm), outside. Two bodies move in fields of their own. In explicit runs, with a lumped mass, impulses at the nodes that both reach keep them apart where their domains meet; in implicit runs, without friction, a penalty keeps the elements of either surface off the other body.",
+        doc: "A body on a rigid body: a penalty keeps the corners of the domains of its points (gimp, cpdi1, cpdi2), or its points (mpm), outside. Two bodies move in fields of their own. In explicit runs, with a lumped mass, impulses at the nodes that both reach keep them apart where their domains meet; in implicit runs a penalty keeps the elements of either surface off the other body.",
         keys: &[
             key("name", Text, Optional("the two names with a hyphen between"),
                 "Names the columns of the history, unique."),

@@ -222,17 +222,6 @@ fn of_two_bodies(
     method: Option<&Method>,
 ) -> Got<()> {
     if analysis.is_some_and(|analysis| analysis.kind != AnalysisType::Explicit) {
-        let wanted = |name: &str| match table.node(name).and_then(|node| node.number()) {
-            Some(value) => value != 0.0,
-            None => table.given(name),
-        };
-        let what = "is not known between two bodies in implicit runs, which slide on each other freely: \
-                    their elastic slip would have to be kept with pairs of points that change";
-        let help = "use analysis.type = \"explicit\", describe one of them as a [[rigid]] body, or \
-                    leave this contact out: the bodies then meet without slip";
-        if let Some(name) = ["friction", "adhesion", "max_shear"].into_iter().find(|n| wanted(n)) {
-            return Err(table.problem_with_help(name, what, help));
-        }
         if let Some(name) = ["from", "until"].into_iter().find(|name| table.given(name)) {
             let what = "two bodies that touch in an implicit run do so in all of its stages";
             return Err(table.problem(name, what));

@@ -322,7 +322,9 @@ impl<const D: usize> ContactTerm<D> {
         }
         let law = self.law(of);
         let slip = if law.has_history() { self.slip(of, x) } else { [0.0; D] };
-        let reached = Reached { near, gap_before: of.gap, slip: pose.vector_to_space(&slip) };
+        // A gap of round-off is none: what touches at the start sticks from there.
+        let gap_before = if of.first.is_some() { of.gap.min(0.0) } else { of.gap };
+        let reached = Reached { near, gap_before, slip: pose.vector_to_space(&slip) };
         Some((near.gap, law.respond(&reached).scaled(self.shares[of.pair][1])))
     }
 

@@ -8,7 +8,7 @@ use crate::contact::told::{self, Told, tell};
 use crate::points::{Points, Snapshot};
 
 /// Slip, of the elastic slip and the depth, up to which a corner sticks: round-off.
-const STILL: f64 = 1e-9;
+pub(super) const STILL: f64 = 1e-9;
 
 /// What a rigid body exerts, this rank's share.
 #[derive(Debug, Clone, Copy, Default)]
@@ -159,12 +159,21 @@ impl<const D: usize> Finished<D> {
     }
 }
 
-/// Gives the points what a step of contact leaves to them: elastic slip of rigid contacts, and what the
-/// fields `contact_*` show, of pairs of bodies too. What it overwrites is kept in `before`.
+/// What a step of contact between bodies leaves to the points.
+#[derive(Debug, Default)]
+pub struct OfBodies<const D: usize> {
+    /// For the fields `contact_*`.
+    pub told: Vec<Told<D>>,
+    /// Point, first word, elastic slip as points keep it; of several for one word the last counts.
+    pub slips: Vec<(usize, usize, [f64; D])>,
+}
+
+/// Gives the points what a step of contact leaves to them: elastic slip, and what the fields `contact_*`
+/// show. What it overwrites is kept in `before`.
 pub fn keep<const D: usize>(
     contacts: &Contacts<D>,
     touching: Option<&Finished<D>>,
-    of_bodies: Vec<Told<D>>,
+    of_bodies: OfBodies<D>,
     points: &mut Points<D>,
     before: Option<&mut Snapshot<D>>,
 ) {
@@ -174,10 +183,11 @@ pub fn keep<const D: usize>(
     if let Some(before) = before {
         before.slip.copy(&points.slip.values);
     }
-    for (p, slot, slip) in touching.iter().flat_map(|touching| &touching.slips) {
+    let slips = touching.iter().flat_map(|touching| &touching.slips);
+    for (p, slot, slip) in slips.chain(&of_bodies.slips) {
         let body = points.body[*p];
         points.slip.of_mut(*p, body)[*slot..*slot + D].copy_from_slice(slip);
     }
     let of_rigids = touching.and_then(|touching| touching.told.as_ref()).into_iter().flatten();
-    tell(contacts, points, of_rigids.copied().chain(of_bodies));
+    tell(contacts, points, of_rigids.copied().chain(of_bodies.told));
 }
