@@ -72,9 +72,11 @@ impl World {
 
     /// Least value of all ranks. Collective.
     pub fn min_u64(&self, value: u64) -> u64 {
-        let mut result = 0u64;
-        reducing(|| self.comm.all_reduce_into(&value, &mut result, SystemOperation::min()));
-        result
+        // MPICH 4.0 compares unsigned numbers as signed ones, so that u64::MAX would be its least.
+        const TOP: u64 = 1 << 63;
+        let (shifted, mut result) = ((value ^ TOP) as i64, 0i64);
+        reducing(|| self.comm.all_reduce_into(&shifted, &mut result, SystemOperation::min()));
+        result as u64 ^ TOP
     }
 
     /// Sum over all ranks. Collective.

@@ -155,7 +155,9 @@ fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
 
 fn versions() -> BTreeMap<String, String> {
     let mpi = mpi::environment::library_version().unwrap_or_default();
-    let mpi = mpi.split(',').next().unwrap_or_default().trim().to_string();
+    // The first line: MPICH's others tell how it was built.
+    let mpi = mpi.split([',', '\n']).next().unwrap_or_default();
+    let mpi = mpi.split_whitespace().collect::<Vec<_>>().join(" ");
     BTreeMap::from([
         ("mpm-par".to_string(), env!("CARGO_PKG_VERSION").to_string()),
         ("PETSc".to_string(), petsc::version()),
