@@ -30,7 +30,7 @@ DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends ./m
 useradd --create-home user
 su user -s /bin/bash -c 'set -euo pipefail; cd
   mpm-par --version
-  mpm-par --new slope
+  mpm-par --new slope >/dev/null
   mpm-par slope.toml --check >/dev/null
   mpirun --oversubscribe -n 2 mpm-par slope.toml --set analysis.steps=2 | tail -n 3
   mpirun --oversubscribe -n 2 mpm-par /usr/share/doc/mpm-par/inputs/beam.toml --out out/beam | tail -n 3
