@@ -275,6 +275,19 @@ fn pushed_blocks_stick_and_slip() {
     assert!((rough / joined - 1.0).abs() < 0.02, "{rough} {joined}");
 }
 
+/// The deck of explicit runs in implicit steps: the block comes as far as Coulomb's law says.
+#[test]
+fn a_block_slides_down_in_implicit_steps() {
+    let text = std::fs::read_to_string(common::run::input("sliding-block")).expect("a deck");
+    let text = text
+        .replace("type = \"explicit\"", "type = \"implicit-dynamic\"\nhht_alpha = -0.1")
+        .replace("cfl = 0.5", "steps = 50")
+        .replace("mass = \"lumped\"\n", "")
+        .replace("velocity_update = 0.95 ", "#");
+    let slid = Run::text(&text).results().verify("slid");
+    assert!(slid < 0.01, "{slid}");
+}
+
 /// Rank boundaries go through the bodies that touch, and a restart repeats the run bit by bit.
 #[test]
 fn ranks_agree_and_a_restart_is_bitwise() {

@@ -31,6 +31,9 @@ use crate::tensor::dense::dot;
 const REACH: f64 = 2.0;
 /// Cells of overlap beyond which elements are taken for opposite sides of a thin body.
 pub const DEEPEST: f64 = 0.5;
+/// Cosine between one normal and the other's opposite beyond which two elements face each other: a side of a
+/// block that rocks on another one does not.
+const FACING: f64 = 0.1;
 /// Sizes of an element beside its centre up to which it is met.
 const BESIDE: f64 = 0.75;
 
@@ -115,7 +118,10 @@ pub fn find<const D: usize>(
             let distance = |to: &Face<D>| -> f64 {
                 face.place.iter().zip(&to.place).map(|(x, y)| (x - y) * (x - y)).sum()
             };
-            let opposite = |to: &&Face<D>| to.body == other && dot(&to.area, &face.area) < 0.0;
+            let opposite = |to: &&Face<D>| {
+                let sizes = norm(&to.area) * norm(&face.area);
+                to.body == other && dot(&to.area, &face.area) < -FACING * sizes
+            };
             let nearest =
                 beside.flatten().copied().filter(opposite).min_by(|a, b| {
                     distance(a).total_cmp(&distance(b)).then_with(|| a.id.cmp(&b.id))
