@@ -536,11 +536,13 @@ fn kept<T: Stored>(value: f64) -> f64 {
 fn blocks_multiply_like_the_rows_they_come_from() {
     blocks_multiply::<f32, 2>();
     blocks_multiply::<f32, 3>();
+    blocks_multiply::<f32, 4>();
     blocks_multiply::<f32, 6>();
     blocks_multiply::<f64, 2>();
     blocks_multiply::<f64, 3>();
+    blocks_multiply::<f64, 4>();
     assert!(Blocks::<f32>::growing([1, 1], 0).is_none());
-    assert!(Half::<f32>::growing(4, 0).is_none());
+    assert!(Half::<f32>::growing(5, 0).is_none());
 }
 
 fn blocks_multiply<T: Stored, const K: usize>() {
@@ -698,6 +700,7 @@ fn half_of_a_symmetric_matrix_multiplies_like_the_whole() {
     for (rows, pairs) in &patterns {
         half_multiplies::<f32, 2>(*rows, pairs);
         half_multiplies::<f32, 3>(*rows, pairs);
+        half_multiplies::<f32, 4>(*rows, pairs);
         half_multiplies::<f32, 6>(*rows, pairs);
         half_multiplies::<f64, 2>(*rows, pairs);
         half_multiplies::<f64, 3>(*rows, pairs);

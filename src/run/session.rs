@@ -398,5 +398,10 @@ fn advice(deck: &Deck) -> Vec<String> {
         advice.push("let steps be cut: analysis.on_failure = \"cut\"".to_string());
     }
     advice.push("more, smaller steps: analysis.steps".to_string());
+    if deck.analysis.kind == AnalysisType::QuasiStatic && !deck.contacts.is_empty() {
+        let all = "a body that contacts alone hold has no state of rest once it slides or lifts off: hold it \
+                   by a [[boundary]], or use analysis.type = \"implicit-dynamic\"";
+        advice.push(all.to_string());
+    }
     advice
 }
