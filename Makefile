@@ -42,7 +42,7 @@ install: build
 
 # Most tests wait for ranks to come and go: more of them than cores.
 test: setup
-	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$((2 * $$(nproc) + 2))} cargo test --release
+	RUST_TEST_THREADS=$${RUST_TEST_THREADS:-$$((2 * $$(nproc) + 4))} cargo test --release
 
 bench: setup
 	cargo bench --bench kernels

@@ -5,11 +5,11 @@ use std::sync::{Condvar, Mutex};
 static BUSY: Mutex<usize> = Mutex::new(0);
 static FREED: Condvar = Condvar::new();
 
-/// Ranks that run at a time, over all tests of this executable: two more than twice the cores, as most
+/// Ranks that run at a time, over all tests of this executable: four more than twice the cores, as most
 /// jobs are so short that their time is the waiting of `mpirun` for its ranks to come and go, and a
 /// single core would wait for most of its time.
 fn ranks_at_a_time() -> usize {
-    2 * std::thread::available_parallelism().map_or(1, usize::from) + 2
+    2 * std::thread::available_parallelism().map_or(1, usize::from) + 4
 }
 
 /// Room for the ranks of one job, given back when dropped.
