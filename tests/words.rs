@@ -83,6 +83,12 @@ fn a_new_deck_is_written_once() {
     assert!(String::from_utf8_lossy(&output.stderr).contains("beam.toml was not written"));
     assert!(std::fs::read_to_string(folder.path().join("mine.toml")).unwrap().contains("[grid]"));
     assert!(!folder.path().join("beam.toml").exists());
+    // Into a log it does not go alone.
+    let file = std::fs::File::create(folder.path().join("job.log")).unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_mpm-par"));
+    command.args(["--new", "beam"]).current_dir(folder.path()).stdout(file);
+    assert!(command.status().unwrap().success());
+    assert!(std::fs::read_to_string(folder.path().join("beam.toml")).unwrap().contains("[grid]"));
 }
 
 /// As short as shows that it runs; the whole is what `--check` looks at.

@@ -117,11 +117,11 @@ fn print(text: &str) -> Result<()> {
     }
 }
 
-/// Writes NAME.toml in the working directory. Where standard output is a file, the deck goes there
-/// instead (`mpm-par --new slope > mine.toml`), and where it is a pipe, there too.
+/// Writes NAME.toml in the working directory. Where standard output is a deck, it goes there instead
+/// (`mpm-par --new slope > mine.toml`), and where it is a pipe or another file, such as a job's log, there too.
 fn write_deck(template: &Template, force: bool) -> Result<()> {
     let stdout = std::io::stdout();
-    let redirected = is_regular_file(1);
+    let redirected = is_deck(1);
     if !stdout.is_terminal() {
         print(template.text.trim_end())?;
     }
@@ -129,7 +129,7 @@ fn write_deck(template: &Template, force: bool) -> Result<()> {
     if redirected {
         let _ = writeln!(
             std::io::stderr(),
-            "the deck went to standard output, which is a file: {} was not written",
+            "the deck went to standard output: {} was not written",
             path.display()
         );
         return Ok(());
@@ -159,7 +159,9 @@ fn is_same(path: &std::path::Path, template: &Template) -> bool {
     fs::read(path).is_ok_and(|bytes| bytes == template.text.as_bytes())
 }
 
-fn is_regular_file(descriptor: i32) -> bool {
-    let found = fs::metadata(format!("/proc/self/fd/{descriptor}"));
-    found.is_ok_and(|found| found.is_file())
+/// Whether a regular file with the ending of a deck is open there.
+fn is_deck(descriptor: i32) -> bool {
+    let link = format!("/proc/self/fd/{descriptor}");
+    let named = fs::read_link(&link).is_ok_and(|path| path.extension() == Some("toml".as_ref()));
+    named && fs::metadata(&link).is_ok_and(|found| found.is_file())
 }
