@@ -15,10 +15,10 @@ use super::external::Loads;
 use super::implicit::first_span;
 use super::release::{released, releases};
 
-/// Share of the forces out of balance, as sums of sizes over the nodes, that nobody is told of: a unit
+/// Up to this share of the forces out of balance nothing is said; either is a sum of sizes over the nodes. A unit
 /// weight of 18e3 and a density of 1800 under 9.81 differ by 2 %.
 const TOLD: f64 = 0.03;
-/// Nodes whose force is the largest but for round-off: the first of them is named.
+/// The first node is named whose force comes as near to the largest as round-off allows.
 const EQUAL: f64 = 1e-6;
 
 /// A warning of initial stresses that are not in balance with what acts at the start. Collective.
@@ -75,7 +75,7 @@ pub(crate) fn warning<const D: usize>(
     )))
 }
 
-/// Surfaces held by a penalty and contacts bear nothing before they have given way.
+/// Whether the start can be in balance: supports by penalty and contacts bear nothing before they have given way.
 fn judged(deck: &Deck) -> bool {
     deck.bodies.iter().any(|body| body.initial_stress.is_some() && body.presence.holds_in(0))
         && deck.boundaries.iter().all(|boundary| boundary.support().is_none())

@@ -146,8 +146,8 @@ impl<const D: usize> Contacts<D> {
         self.with_slip(&self.pairs[..pair], self.pairs[pair].body) * corners * D
     }
 
-    /// First word of the elastic slip of an element that a point of `body` with so many corners carries, in
-    /// contact with another body; `carried`: elements that points of this body carry at most.
+    /// Where the elastic slip of an `element` begins among the words of the point that carries it, in contact of
+    /// `body` with another one. A point has so many `corners` and carries at most so many elements (`carried`).
     pub fn slot_of_element(
         &self,
         (pair, body, element): (usize, usize, usize),
@@ -158,7 +158,7 @@ impl<const D: usize> Contacts<D> {
         (before + earlier * carried + element) * D
     }
 
-    /// How many of some contacts with rigid bodies keep elastic slip with the points of a body.
+    /// How many of some `pairs` with rigid bodies make the points of a body keep elastic slip.
     fn with_slip(&self, pairs: &[Pair], body: usize) -> usize {
         pairs.iter().filter(|pair| pair.body == body && pair.law.has_history()).count()
     }
@@ -195,7 +195,7 @@ impl<const D: usize> Contacts<D> {
     }
 }
 
-/// Those of some pairs of bodies that rub on a body.
+/// The pairs, among some, in which a body rubs on another one.
 fn rubbing(pairs: &[BodyPair], body: usize) -> impl Iterator<Item = &BodyPair> {
     let rubs =
         move |pair: &&BodyPair| pair.bodies.contains(&body) && pair.friction != Friction::Smooth;

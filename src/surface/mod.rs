@@ -47,7 +47,7 @@ pub struct Carried<const D: usize> {
 pub struct Surface<const D: usize> {
     elements: Vec<Carried<D>>,
     of_carrier: FxHashMap<u64, Range<usize>>,
-    /// Of the elements of one carrier the largest number.
+    /// How many elements a carrier has at most.
     most: usize,
 }
 

@@ -29,8 +29,9 @@ pub(crate) struct Batch {
     lines: usize,
     /// First line of the point pushed last.
     first: usize,
-    /// Lines that are filled at most, and lines that there are: with F-bar cells may follow the last point.
+    /// A batch with so many lines is full.
     capacity: usize,
+    /// Lines that there is memory for: with F-bar cells may follow the last point of a full batch.
     room: usize,
     /// g_aj: line (p, j), column a.
     gradients: Vec<f64>,

@@ -1,6 +1,6 @@
 //! Gaps of the nodes from a rigid surface. A signed distance changes by no more than the way: the gap of a
-//! point is at least that of a node less the distance between them. So one node of a point's tells for most
-//! points that they are far from the surface, and points outnumber nodes.
+//! point is at least that of a node less the distance between them. So most points are known to be far from the
+//! surface by the gap of one of their nodes, and nodes are fewer than points.
 
 use crate::contact::pose::Pose;
 use crate::contact::surface::Surface;
