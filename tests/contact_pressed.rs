@@ -8,7 +8,7 @@ use std::path::Path;
 
 use common::on_ranks;
 use common::product::product;
-use common::run::{Results, Run, last, relative_difference};
+use common::run::{Results, Run, last, probed, relative_difference};
 use mpi::environment::Universe;
 use mpi::traits::*;
 use mpm_par::deck;
@@ -78,15 +78,6 @@ near = [0, 0.001]
 fields = ["stress"]
 "#
     )
-}
-
-/// Of a column of `probes.csv` the last value.
-fn probed(results: &Results, name: &str) -> f64 {
-    let text = results.text("probes.csv");
-    let mut rows = text.lines();
-    let column = rows.next().expect("names").split(',').position(|own| own.starts_with(name));
-    let row = rows.next_back().expect("a row");
-    row.split(',').nth(column.expect("a column")).expect("a cell").parse().expect("a number")
 }
 
 /// Two equal cylinders: 1/R = 1/2 + 1/2, E* = E / (2 (1 - nu^2)), a = sqrt(4 F R / (pi E*)),

@@ -3,7 +3,7 @@
 
 mod common;
 
-use common::run::Run;
+use common::run::{Run, probed};
 use mpm_par::deck::templates::template_of;
 
 /// Template; what is replaced in it; by what; exit code of `--check`; words that are said.
@@ -208,9 +208,7 @@ fields = ["displacement.y"]
         let (plane, shear) = (1e9 / (1.0 - 0.04), 1e9 / 2.4);
         let bending = 8f64.powi(4) / (8.0 * plane * thickness * thickness / 12.0);
         let exact = -(bending + 8f64.powi(2) / (2.0 * shear * 5.0 / 6.0));
-        let probes = outcome.results().text("probes.csv");
-        let tip: f64 = probes.lines().last().unwrap().rsplit(',').next().unwrap().parse().unwrap();
-        let stiffer = exact / tip;
+        let stiffer = exact / probed(&outcome.results(), "tip.displacement.y");
         assert!(bounds.contains(&stiffer), "{thickness}: {stiffer}");
         assert_eq!(said.contains("cells thick"), told, "{thickness}: {said}");
     }

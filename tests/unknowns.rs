@@ -15,11 +15,12 @@ use mpm_par::analysis::solver::{self, Linear, Shape};
 use mpm_par::deck;
 use mpm_par::deck::model::{Frame, InvertedIterates};
 use mpm_par::parallel::World;
-use mpm_par::petsc::{Ksp, Session};
+use mpm_par::petsc::{Ksp, NewtonOutcome, Session};
 use mpm_par::run::setup;
 use mpm_par::system::conditions::Conditions;
 use mpm_par::system::held::Held;
 use mpm_par::system::in_place::{InPlace, RowAddresses};
+use mpm_par::system::model::Model;
 use mpm_par::system::scatter::{BlockMatrix, BlockRows, add_support};
 use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::block::add_block;
@@ -239,7 +240,7 @@ fn heat_by_newton(universe: &Universe) {
     let (model, points) = setup::prepare::<2>(world, deck).expect("a sound problem");
     let mesh = Discretisation::new(world, &model, &points).expect("a system");
     let step = mesh.step_points(&points, &model.materials);
-    let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+    let numbering = &mesh.numbering;
 
     let places: Vec<[f64; 2]> =
         numbering.nodes.iter().map(|&node| model.grid.node_position(node)).collect();
@@ -251,40 +252,16 @@ fn heat_by_newton(universe: &Universe) {
         (true, false) => 0.5 * SLOPE * (1.0 + SLOPE * SLOPE),
         (false, _) => 0.0,
     };
-    let held = |(fixed, value): (&bool, &f64)| if *fixed { *value } else { 0.0 };
-    let conditions = Conditions {
-        increment: fixed.iter().zip(&exact).map(held).collect(),
-        fixed: fixed.clone(),
-        ..Conditions::default()
-    };
-    let ghost = Ghost::new(world, &mesh).expect("faces").expect("the plate has Ghost faces");
-    let equations = StepEquations {
-        conditions: &conditions,
-        left_out: &vec![false; numbering.len()],
-        external_owned: places[..numbering.owned].iter().map(entering).collect(),
-        terms: vec![Box::new(Conduction { step }), Box::new(ghost)],
-    };
-    let settings = NewtonSettings {
-        tolerance: 1e-12,
-        max_evaluations: 12,
-        frame: Frame::Previous,
-        inverted: InvertedIterates::Reject,
-        symmetric: true,
-    };
-    let mut problem = Equilibrium::<2, 1>::of_terms(world, &model.grid, &mesh, equations, settings);
-    let mut matrix = solver::block_matrix::<1>(world, numbering, pattern).expect("a matrix");
-    let mut solution = matrix.vector().expect("a vector");
-    let shape = Shape { symmetric: true, search: false };
-    let mut newton =
-        solver::newton(world, Linear::DirectOnOne, shape, false, 12).expect("a solver");
-    let outcome = newton.solve(&mut problem, &mut matrix, &mut solution).expect("a solve");
-    assert!(outcome.converged && outcome.iterations >= 3, "{outcome:?}");
-    let found = solution.values().expect("values");
-    for (dof, value) in found.iter().enumerate() {
-        assert!((value - exact[dof]).abs() < 1e-10, "{dof}: {value} {}", exact[dof]);
-    }
+    let external = places[..numbering.owned].iter().map(entering).collect();
+    let (outcome, errors) = solve_step::<2, 1>(
+        world,
+        (&model, &mesh),
+        (&exact, fixed, external),
+        Box::new(Conduction { step }),
+        (Linear::DirectOnOne, 1e-12, 1e-10),
+    );
+    assert!(outcome.iterations >= 3, "{outcome:?}");
     // Quadratic: the last errors square, down to round-off.
-    let errors = &problem.errors;
     let late = errors.windows(2).find(|pair| pair[0] < 1e-2).expect("an error below 1e-2");
     assert!(late[1] < 100.0 * late[0] * late[0] + 1e-13, "{errors:?}");
 }
@@ -292,6 +269,49 @@ fn heat_by_newton(universe: &Universe) {
 #[test]
 fn one_unknown_by_newtons_method() {
     on_ranks("one_unknown_by_newtons_method", &[1, 2, 3], heat_by_newton);
+}
+
+/// Solves a step of a `term` and of Ghost faces for fields that are held to `exact` where `fixed`, and asserts
+/// that they are found to `bound` everywhere. `external`: of the owned unknowns.
+fn solve_step<const D: usize, const N: usize>(
+    world: &World,
+    (model, mesh): (&Model<D>, &Discretisation<D>),
+    (exact, fixed, external): (&[f64], Vec<bool>, Vec<f64>),
+    term: Box<dyn Term<N> + '_>,
+    (linear, tolerance, bound): (Linear, f64, f64),
+) -> (NewtonOutcome, Vec<f64>) {
+    let held = |(fixed, value): (&bool, &f64)| if *fixed { *value } else { 0.0 };
+    let conditions = Conditions {
+        increment: fixed.iter().zip(exact).map(held).collect(),
+        fixed,
+        ..Conditions::default()
+    };
+    let ghost = Ghost::new(world, mesh).expect("faces").expect("there are Ghost faces");
+    let equations = StepEquations {
+        conditions: &conditions,
+        left_out: &vec![false; mesh.numbering.len()],
+        external_owned: external,
+        terms: vec![term, Box::new(ghost)],
+    };
+    let settings = NewtonSettings {
+        tolerance,
+        max_evaluations: 12,
+        frame: Frame::Previous,
+        inverted: InvertedIterates::Reject,
+        symmetric: true,
+    };
+    let mut problem = Equilibrium::<D, N>::of_terms(world, &model.grid, mesh, equations, settings);
+    let mut matrix =
+        solver::block_matrix::<N>(world, &mesh.numbering, &mesh.pattern).expect("a matrix");
+    let mut solution = matrix.vector().expect("a vector");
+    let shape = Shape { symmetric: true, search: false };
+    let mut newton = solver::newton(world, linear, shape, false, 12).expect("a solver");
+    let outcome = newton.solve(&mut problem, &mut matrix, &mut solution).expect("a solve");
+    assert!(outcome.converged, "{outcome:?}");
+    for (dof, value) in solution.values().expect("values").iter().enumerate() {
+        assert!((value - exact[dof]).abs() < bound, "{dof}: {value} {}", exact[dof]);
+    }
+    (outcome, problem.errors)
 }
 
 /// Σ_p V A ∇S · ∇u: fields that are conducted together.
@@ -357,7 +377,7 @@ fn iterations_by_multigrid<const D: usize, const N: usize>(
     let (model, points) = setup::prepare::<D>(world, deck).expect("a sound problem");
     let mesh = Discretisation::new(world, &model, &points).expect("a system");
     let step = mesh.step_points(&points, &model.materials);
-    let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
+    let numbering = &mesh.numbering;
 
     let places: Vec<[f64; D]> =
         numbering.nodes.iter().map(|&node| model.grid.node_position(node)).collect();
@@ -372,36 +392,14 @@ fn iterations_by_multigrid<const D: usize, const N: usize>(
             area * line.iter().zip(slopes).map(|(share, slope)| share * slope).sum::<f64>()
         })
     };
-    let held = |(fixed, value): (&bool, &f64)| if *fixed { *value } else { 0.0 };
-    let conditions = Conditions {
-        increment: fixed.iter().zip(&exact).map(held).collect(),
-        fixed: fixed.clone(),
-        ..Conditions::default()
-    };
-    let ghost = Ghost::new(world, &mesh).expect("faces").expect("the bar has Ghost faces");
-    let equations = StepEquations {
-        conditions: &conditions,
-        left_out: &vec![false; numbering.len()],
-        external_owned: places[..numbering.owned].iter().flat_map(entering).collect(),
-        terms: vec![Box::new(Together { step, coupling }), Box::new(ghost)],
-    };
-    let settings = NewtonSettings {
-        tolerance: 1e-11,
-        max_evaluations: 12,
-        frame: Frame::Previous,
-        inverted: InvertedIterates::Reject,
-        symmetric: true,
-    };
-    let mut problem = Equilibrium::<D, N>::of_terms(world, &model.grid, &mesh, equations, settings);
-    let mut matrix = solver::block_matrix::<N>(world, numbering, pattern).expect("a matrix");
-    let mut solution = matrix.vector().expect("a vector");
-    let shape = Shape { symmetric: true, search: false };
-    let mut newton = solver::newton(world, Linear::Multigrid, shape, false, 12).expect("a solver");
-    let outcome = newton.solve(&mut problem, &mut matrix, &mut solution).expect("a solve");
-    assert!(outcome.converged, "{outcome:?}");
-    for (dof, value) in solution.values().expect("values").iter().enumerate() {
-        assert!((value - exact[dof]).abs() < 1e-8, "{dof}: {value} {}", exact[dof]);
-    }
+    let external = places[..numbering.owned].iter().flat_map(entering).collect();
+    let (outcome, _) = solve_step::<D, N>(
+        world,
+        (&model, &mesh),
+        (&exact, fixed, external),
+        Box::new(Together { step, coupling }),
+        (Linear::Multigrid, 1e-11, 1e-8),
+    );
     outcome.linear_iterations_max
 }
 

@@ -2,10 +2,9 @@
 
 use crate::contact::free::FreeBody;
 use crate::contact::pose::Pose;
-use crate::deck::model::Load;
-use crate::deck::{Presence, Scope, When};
+use crate::deck::{Presence, When};
 use crate::error::Result;
-use crate::loads::Moment;
+use crate::loads::{Moment, total_gravity};
 use crate::output::restart::run_state::RunState;
 use crate::output::tables::history::FreeState;
 use crate::system::conditions::StepSpan;
@@ -82,15 +81,5 @@ pub(crate) fn gravity<const D: usize>(
     when: When,
 ) -> [f64; D] {
     let at = Moment::new(model.deck.analysis.kind, Presence::default(), when);
-    let mut scope = Scope { load_factor: at.load_factor, time: at.time, ..Scope::default() };
-    scope.initial[..D].copy_from_slice(&body.pose.centre);
-    let mut sum = [0.0; D];
-    for load in &model.deck.loads {
-        if let Load::Gravity(all) = load {
-            for (sum, value) in sum.iter_mut().zip(&all.0) {
-                *sum += at.factor_of(value) * value.value(&scope);
-            }
-        }
-    }
-    sum
+    total_gravity(&model.deck.loads, at, &body.pose.centre)
 }

@@ -84,6 +84,11 @@ impl<const D: usize> Lattice<D> {
         std::array::from_fn(|a| self.origin[a] + self.spacing[a] * index[a] as f64)
     }
 
+    /// Where the grid ends along one axis, m.
+    pub fn end(&self, axis: usize) -> f64 {
+        self.origin[axis] + self.spacing[axis] * self.cells[axis] as f64
+    }
+
     /// Position in units of cells along one axis.
     pub fn scaled(&self, axis: usize, x: f64) -> f64 {
         (x - self.origin[axis]) / self.spacing[axis]

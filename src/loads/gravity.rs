@@ -1,7 +1,7 @@
 //! f_p = m_p g (Lagrangian eq. 24): gravity on the constant mass of the points.
 
 use super::declaration::{Around, Declaration, expressions};
-use super::{Load, Moment, Start, scope_of};
+use super::{Declared, Load, Moment, Start, scope_of};
 use crate::deck::expression::{Expression, Variable};
 use crate::deck::model::Body;
 use crate::deck::schema::{Key, Kind, Need, key};
@@ -47,6 +47,20 @@ impl Declaration for Gravity {
     fn make<const D: usize>(&self, _start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {
         Ok(Box::new(self.clone()))
     }
+}
+
+/// All gravity among the `loads` of a deck at a place (its initial coordinates, m), m/s2.
+pub fn total_gravity<const D: usize>(loads: &[Declared], at: Moment, place: &[f64; D]) -> [f64; D] {
+    let mut scope = at.scope();
+    scope.initial[..D].copy_from_slice(place);
+    let mut total = [0.0; D];
+    for load in loads {
+        if let Declared::Gravity(Gravity(gravity)) = load {
+            let values: [f64; D] = at.values(gravity, &scope);
+            total.iter_mut().zip(values).for_each(|(total, value)| *total += value);
+        }
+    }
+    total
 }
 
 impl<const D: usize> Load<D> for Gravity {

@@ -30,7 +30,7 @@ mod wind;
 
 pub use body_force::BodyForce;
 pub use declaration::{Around, Declaration, expressions};
-pub use gravity::Gravity;
+pub use gravity::{Gravity, total_gravity};
 pub use manufactured::{MadeField, Manufactured};
 pub use point::{Carriers, Point, PointForce};
 pub use pressing::Pressing;

@@ -9,8 +9,8 @@ use crate::system::scatter::BlockMatrix;
 use crate::tensor::fused::has_avx2;
 use crate::tensor::fused::multiply_add;
 
-/// Columns of a chunk.
-const WIDTH: usize = 8;
+/// Columns of a chunk. Values to be solved for need room up to a multiple of it.
+pub const WIDTH: usize = 8;
 type Chunk = [f64; WIDTH];
 
 /// Products of the factorisation per stored entry of the matrix, below which it costs less than iterations.
@@ -59,8 +59,8 @@ impl Complete {
         self.factors.iter().all(|factor| factor.least_pivot >= SOUND_PIVOT)
     }
 
-    /// x = A^-1 x for columns that are as many components, again and again. `x`: of all nodes, and some more values
-    /// of any size up to a multiple of eight.
+    /// x = A^-1 x. Columns belong to the components in turn, again and again. `x`: a row for each node, and room up
+    /// to a multiple of [`WIDTH`] rows, where any number may stand.
     pub fn solve<const C: usize>(&self, x: &mut [[f64; C]]) {
         if let [only] = &self.factors[..] {
             return only.solve(x);
@@ -186,7 +186,7 @@ fn eliminate_in<const FUSED: bool>(rows: &[Row], chunks: &mut [Chunk], row: usiz
     dot::<FUSED>(own, own)
 }
 
-/// Of as many chunks as `a` has.
+/// Σ a b over the chunks of `a`.
 #[inline(always)]
 fn dot<const FUSED: bool>(a: &[Chunk], b: &[Chunk]) -> f64 {
     let mut sums = [0.0; WIDTH];

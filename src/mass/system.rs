@@ -12,7 +12,7 @@ use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockMatrix;
 
-use super::envelope::Complete;
+use super::envelope::{self, Complete};
 use super::incomplete::Incomplete;
 use super::matrix;
 
@@ -57,13 +57,13 @@ pub struct System<'a, const C: usize> {
     factor: Option<&'a Factor>,
     /// Of owned nodes: to be solved for.
     free: &'a [[bool; C]],
-    /// Values at local nodes, with room up to a multiple of eight.
+    /// Values at local nodes, with room for a complete factor's chunks.
     local: Vec<[f64; C]>,
 }
 
 impl<'a, const C: usize> System<'a, C> {
     pub fn new(product: Product<'a>, factor: Option<&'a Factor>, free: &'a [[bool; C]]) -> Self {
-        let room = product.numbering.len().next_multiple_of(8);
+        let room = product.numbering.len().next_multiple_of(envelope::WIDTH);
         System { product, factor, free, local: vec![[0.0; C]; room] }
     }
 }

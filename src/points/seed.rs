@@ -157,9 +157,7 @@ fn within_lattice<const D: usize>(
         }
         for sub in 0..per_cell {
             if let Some(x) = sub_cells.inside(&sub_cell(cell, sub, counts)) {
-                let end: [f64; D] = std::array::from_fn(|a| {
-                    lattice.origin[a] + lattice.spacing[a] * cells[a] as f64
-                });
+                let end: [f64; D] = std::array::from_fn(|a| lattice.end(a));
                 return Err(Error::Input(format!(
                     "body \"{}\" reaches outside the grid: its shape holds {x:?}, the grid goes \
                      from {:?} to {end:?}; enlarge the grid, or move or cut the body",

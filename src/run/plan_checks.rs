@@ -4,9 +4,10 @@
 use std::ops::RangeInclusive;
 
 use crate::analysis::time_steps::{TimeSteps, stability_limit};
-use crate::deck::model::{AnalysisType, Every, Load, Material, Place};
+use crate::deck::model::{AnalysisType, Every, Material, Place};
+use crate::deck::schema::{AXES, SIDES};
 use crate::deck::{Deck, Presence, When, rough};
-use crate::loads::Moment;
+use crate::loads::{Moment, total_gravity};
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
@@ -34,13 +35,7 @@ pub type Row = (Option<(String, String)>, Option<String>);
 fn gravity<const D: usize>(deck: &Deck) -> [f64; D] {
     let when = When { factor: 1.0, ..When::default() };
     let at = Moment::new(deck.analysis.kind, Presence::default(), when);
-    let mut gravity = [0.0; D];
-    for load in &deck.loads {
-        if let Load::Gravity(g) = load {
-            gravity.iter_mut().zip(&g.0).for_each(|(sum, g)| *sum += g.value(&at.scope()));
-        }
-    }
-    gravity
+    total_gravity(&deck.loads, at, &[0.0; D])
 }
 
 /// In space: a warning of a weight along x or z that nothing bears but side "bottom", which is the lowest
@@ -62,13 +57,8 @@ pub fn wrong_floor<const D: usize>(deck: &Deck) -> Option<String> {
             _ => return None,
         }
     }
-    let name = ["x", "y", "z"][axis];
-    let (side, end) = match (axis, upper) {
-        (0, false) => ("left", "lowest"),
-        (0, true) => ("right", "highest"),
-        (_, false) => ("back", "lowest"),
-        (_, true) => ("front", "highest"),
-    };
+    let (name, side) = (AXES[axis], SIDES[2 * axis + usize::from(upper)]);
+    let end = if upper { "highest" } else { "lowest" };
     bottom_bears.then(|| {
         format!(
             "the weight acts along {name}, and side \"bottom\", the lowest y, alone bears it; the {end} {name} \

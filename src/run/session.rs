@@ -399,9 +399,9 @@ fn advice(deck: &Deck) -> Vec<String> {
     }
     advice.push("more, smaller steps: analysis.steps".to_string());
     if deck.analysis.kind == AnalysisType::QuasiStatic && !deck.contacts.is_empty() {
-        let all = "a body that contacts alone hold has no state of rest once it slides or lifts off: hold it \
+        let rest = "a body that contacts alone hold has no state of rest once it slides or lifts off: hold it \
                    by a [[boundary]], or use analysis.type = \"implicit-dynamic\"";
-        advice.push(all.to_string());
+        advice.push(rest.to_string());
     }
     advice
 }

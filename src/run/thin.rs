@@ -13,12 +13,12 @@ use crate::system::model::Model;
 
 use super::plan_checks::extents;
 
-/// Cells of thickness below which a body is told of.
+/// A body thinner than so many cells is warned of.
 const THIN: f64 = 1.9;
-/// Length over thickness of what bends rather than shears.
+/// A body bends rather than shears if its length is so many times its thickness.
 const SLENDER: f64 = 5.0;
-/// A body among softer ones is there to carry: stiffness over that of every other. A layer of ground is
-/// carried by its neighbours.
+/// The other bodies hold a body straight, as layers of the ground do, unless it is so many times stiffer than
+/// each of them.
 const STIFFER: f64 = 10.0;
 
 /// A warning of the first such body on a lattice. Collective.
@@ -41,14 +41,12 @@ pub fn warning<const D: usize>(
         volumes[points.body[p] as usize] += points.volume_initial[p];
     }
     let volumes = world.sum_slice(&volumes);
-    let top =
-        |axis: usize| lattice.origin[axis] + lattice.spacing[axis] * lattice.cells[axis] as f64;
     for (index, body) in deck.bodies.iter().enumerate() {
         let length: [f64; D] =
             std::array::from_fn(|axis| spans[axis][index][1] - spans[axis][index][0]);
         let longest = length.into_iter().fold(0.0, f64::max);
         if volumes[index] == 0.0 {
-            // Of a later stage.
+            // The body comes in a later stage.
             continue;
         }
         let mut others = (0..deck.bodies.len()).filter(|&other| other != index);
@@ -63,7 +61,8 @@ pub fn warning<const D: usize>(
             let guided = deck.boundaries.iter().any(|boundary| match boundary.place {
                 Place::Side { axis: of, upper } if of == axis && boundary.may_hold(axis) => {
                     let [low, high] = spans[axis][index];
-                    let gap = if upper { top(axis) - high } else { low - lattice.origin[axis] };
+                    let gap =
+                        if upper { lattice.end(axis) - high } else { low - lattice.origin[axis] };
                     gap < lattice.spacing[axis]
                 }
                 _ => false,

@@ -31,8 +31,8 @@ use crate::tensor::dense::dot;
 const REACH: f64 = 2.0;
 /// Cells of overlap beyond which elements are taken for opposite sides of a thin body.
 pub const DEEPEST: f64 = 0.5;
-/// Cosine between one normal and the other's opposite beyond which two elements face each other: a side of a
-/// block that rocks on another one does not.
+/// Two elements face each other where the cosine between one's normal and the other's opposite is larger. The
+/// side of a block that rocks on the ground does not face the ground.
 const FACING: f64 = 0.1;
 /// Sizes of an element beside its centre up to which it is met.
 const BESIDE: f64 = 0.75;
@@ -46,7 +46,7 @@ pub struct Couple<const D: usize> {
     pub of_second: bool,
     /// The point that carries it.
     pub point: usize,
-    /// Its number among those that this point carries.
+    /// Number of the element among those that this point carries.
     pub element: usize,
     /// Nodes of the fields of both carriers; in the pattern they are local ones.
     pub nodes: Vec<usize>,

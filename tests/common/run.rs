@@ -300,6 +300,15 @@ pub fn last(results: &Results, name: &str) -> f64 {
     *results.history(name).last().expect("a row")
 }
 
+/// The last value of a column of `probes.csv`, whose name begins with `name`.
+pub fn probed(results: &Results, name: &str) -> f64 {
+    let text = results.text("probes.csv");
+    let mut rows = text.lines();
+    let column = rows.next().expect("names").split(',').position(|own| own.starts_with(name));
+    let row = rows.next_back().expect("a row");
+    row.split(',').nth(column.expect("a column")).expect("a cell").parse().expect("a number")
+}
+
 /// Largest difference over the largest magnitude of `b`; infinite if the lengths differ.
 pub fn relative_difference(a: &[f64], b: &[f64]) -> f64 {
     if a.len() != b.len() {

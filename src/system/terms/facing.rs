@@ -24,8 +24,7 @@ use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockRows;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::touching::{Met, OfBodies, STILL};
-use crate::tensor::Square;
-use crate::tensor::dense::{apply, dot, inverse};
+use crate::tensor::dense::{apply, block, dot, inverse};
 
 use super::block::add_block;
 use super::contact::{TOUCH, coupling};
@@ -75,7 +74,7 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
             if term.law(of).has_history() {
                 let row = &points.slip.of(of.point, points.body[of.point])[slot..];
                 let kept = std::array::from_fn(|i| row[i]);
-                slip = apply(&gradient(points, of.point), &kept);
+                slip = apply(&block(&points.deformation_gradient[of.point]), &kept);
             }
             // What the step before has left, within what the pressure now allows.
             let response = term.respond(of, of.gap, 0.0, slip);
@@ -233,7 +232,7 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
                 // All of it: the pressure that the next step begins with may allow more.
                 let whole: [f64; D] =
                     std::array::from_fn(|i| response.elastic_slip[i] + response.sliding[i]);
-                let (back, _) = inverse(&gradient(points, of.point));
+                let (back, _) = inverse::<D>(&block(&points.deformation_gradient[of.point]));
                 kept.slips.push((of.point, start.slot, apply(&back, &whole)));
             }
             if self.contacts.tells {
@@ -264,12 +263,6 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
         }
         none
     }
-}
-
-/// F of a point in the plane or in space.
-fn gradient<const D: usize>(points: &Points<D>, p: usize) -> Square<D> {
-    let f = &points.deformation_gradient[p];
-    std::array::from_fn(|i| std::array::from_fn(|j| f[(i, j)]))
 }
 
 impl<const D: usize> Term<D> for &FacingTerm<'_, D> {
