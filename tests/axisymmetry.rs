@@ -426,6 +426,35 @@ fn a_cavity_in_sand_has_the_pressures_of_the_series() {
     assert!(results.count("newton_iterations.max") <= 6);
 }
 
+/// Yu and Houlsby (1991) for an endless medium under 100 kPa all round without cohesion: p / p_0 at a / a_0
+/// (formulations.md C.2), the outer radius 600 times the cavity's.
+#[test]
+fn a_cavity_in_endless_sand_has_the_pressures_of_yu_and_houlsby() {
+    let results = Run::of("cavity")
+        .set("grid.generate.box={spacing=[[[1, 0.05], [3, 0.1], [600, 40]], [[0, 0.25], [0.25, 0.25]]]}")
+        .set("body.0.shape={box={min=[1, 0], max=[600, 0.25]}}")
+        .set("body.0.initial_stress={xx=-1e5, yy=-1e5, zz=-1e5}")
+        .set("boundary.0.displacement.x=2.0")
+        .set("boundary.2.where={box={min=[0, 0], max=[700, 1]}}")
+        .set("material.sand.cohesion=0.0")
+        .set("analysis.steps=200")
+        .results();
+    let table = [
+        (1.01, 2.3471),
+        (1.05, 4.0087),
+        (1.1, 5.0347),
+        (1.2, 6.2294),
+        (1.5, 7.8728),
+        (2.0, 8.9156),
+        (3.0, 9.6183),
+    ];
+    for (a, wanted) in table {
+        let found = pressure_at(&results, "cavity", (a - 1.0) / 2.0, a, 0.25) / 100e3;
+        let tolerance = if a < 2.5 { 1e-3 } else { 5e-3 };
+        assert!((found / wanted - 1.0).abs() < tolerance, "a = {a}: {found} for {wanted}");
+    }
+}
+
 #[test]
 fn a_plastic_tube_has_the_pressures_of_hill() {
     for ranks in [1, 3] {

@@ -1,12 +1,12 @@
 //! f = sqrt(J2) + eta p - xi c = 0 in Kirchhoff stress (p mean stress, tension positive), with the
 //! potential of the same form in eta_bar: closed-form return to the cone or to its apex
 //! p = xi c / eta (de Souza Neto, Peric, Owen 2008, section 8.3); with `softening` cohesion and angles
-//! fall with the plastic strain ([`super::softening`]).
+//! fall with the plastic strain, with `hardening` the cohesion grows ([`super::softening`]).
 
 use super::model::elastic_by;
 use super::mohr_coulomb::{COHESION, DILATION, FRICTION, STIFF, check_cone, check_residual};
 use super::parameter::{POISSON, Parameter};
-use super::softening::{self, Falling};
+use super::softening::{self, Change, check_hardening};
 use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
 
 /// Share of the compared stresses; see the same constant of [`super::VonMises`].
@@ -30,18 +30,7 @@ pub struct DruckerPrager {
     strength: f64,
     eta_bar: f64,
     /// `None`: the strength stays.
-    softening: Option<Softening>,
-}
-
-/// How the strength falls.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Softening {
-    /// Where the fall ends.
-    strain: f64,
-    /// Angles in degrees, cohesion in Pa.
-    friction: Falling,
-    dilation: Falling,
-    cohesion: Falling,
+    change: Option<Change>,
     fit: f64,
 }
 
@@ -89,27 +78,25 @@ fn cone_rate(degrees: f64, fit: f64) -> [f64; 2] {
 
 impl DruckerPrager {
     /// The perfect surface of κ, and its rates.
-    fn softened(&self, softening: &Softening, kappa: f64) -> (DruckerPrager, Rates) {
-        let at = |falling: &Falling| falling.at(kappa, softening.strain);
-        let ([phi, phi_rate], [psi, psi_rate]) = (at(&softening.friction), at(&softening.dilation));
-        let [cohesion, cohesion_rate] = at(&softening.cohesion);
-        let ([eta, xi], [eta_bar, _]) = (cone(phi, softening.fit), cone(psi, softening.fit));
-        let [eta_slope, xi_slope] = cone_rate(phi, softening.fit);
+    fn surface(&self, change: &Change, kappa: f64) -> (DruckerPrager, Rates) {
+        let [[phi, phi_rate], [psi, psi_rate], [cohesion, cohesion_rate]] = change.at(kappa);
+        let ([eta, xi], [eta_bar, _]) = (cone(phi, self.fit), cone(psi, self.fit));
+        let [eta_slope, xi_slope] = cone_rate(phi, self.fit);
         let surface =
-            DruckerPrager { eta, strength: xi * cohesion, eta_bar, softening: None, ..*self };
+            DruckerPrager { eta, strength: xi * cohesion, eta_bar, change: None, ..*self };
         let rates = Rates {
             eta: eta_slope * phi_rate,
             strength: xi_slope * phi_rate * cohesion + xi * cohesion_rate,
-            eta_bar: cone_rate(psi, softening.fit)[0] * psi_rate,
+            eta_bar: cone_rate(psi, self.fit)[0] * psi_rate,
         };
         (surface, rates)
     }
 
     /// [`Model::respond`] from κ on.
     #[inline(never)]
-    fn respond_softening(&self, softening: &Softening, trial: [f64; 3], kappa: f64) -> Response {
-        softening::respond(&self.elasticity, trial, (kappa, softening.strain), |kappa| {
-            let (surface, rates) = self.softened(softening, kappa);
+    fn respond_changing(&self, change: &Change, trial: [f64; 3], kappa: f64) -> Response {
+        softening::respond(&self.elasticity, trial, (kappa, change), |kappa| {
+            let (surface, rates) = self.surface(change, kappa);
             surface.respond_with_rate(trial, Some(rates))
         })
     }
@@ -189,8 +176,8 @@ impl DruckerPrager {
 
 impl Model for DruckerPrager {
     const NAME: &'static str = "drucker-prager";
-    const DOC: &'static str = "Hencky elasticity with a Drucker-Prager cone, perfect or softening, and \
-        its apex, non-associated where dilation differs from friction.";
+    const DOC: &'static str = "Hencky elasticity with a Drucker-Prager cone, perfect, softening or \
+        hardening, and its apex, non-associated where dilation differs from friction.";
     const PARAMETERS: &'static [Parameter] = &[
         STIFF,
         POISSON,
@@ -203,42 +190,38 @@ impl Model for DruckerPrager {
         softening::FRICTION,
         softening::DILATION,
         softening::LENGTH,
+        softening::HARDENING,
     ];
     const STATE: &'static [StateVariable] = &[softening::KAPPA];
 
     fn new(p: &[f64]) -> Self {
         let ([eta, xi], [eta_bar, _]) = (cone(p[2], p[5]), cone(p[3], p[5]));
-        let softening = p[6].is_finite().then(|| Softening {
-            strain: p[6],
-            friction: Falling::new(p[2], p[8]),
-            dilation: Falling::new(p[3], p[9]),
-            cohesion: Falling::new(p[4], p[7]),
-            fit: p[5],
-        });
+        let change = Change::new(p[6], p[11], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]]);
         let elasticity = Hencky::new(p[0], p[1]);
-        DruckerPrager { elasticity, eta, strength: xi * p[4], eta_bar, softening }
+        DruckerPrager { elasticity, eta, strength: xi * p[4], eta_bar, change, fit: p[5] }
     }
 
     fn state_words(&self) -> usize {
-        usize::from(self.softening.is_some())
+        usize::from(self.change.is_some())
     }
 
     fn check(p: &[f64]) -> Result<(), Misfit> {
         check_cone(p[2], p[3], p[4])?;
+        check_hardening(p[6], p[11])?;
         check_residual(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]]).map(drop)
     }
 
     #[inline]
     fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
-        match &self.softening {
+        match &self.change {
             None => self.respond_perfectly(trial),
-            Some(softening) => self.respond_softening(softening, trial, state[0]),
+            Some(change) => self.respond_changing(change, trial, state[0]),
         }
     }
 
     elastic_by!(elasticity);
 
     fn symmetric(&self) -> bool {
-        self.eta == self.eta_bar && self.softening.is_none()
+        self.eta == self.eta_bar && self.change.is_none()
     }
 }

@@ -19,7 +19,7 @@
 //! |---|---|
 //! | `model.rs` | [`Model`]: what each of them owes |
 //! | `local.rs` | [`LocalMaterial`]: the model with the parameters that hold at a point |
-//! | `softening.rs` | strength that falls with plastic strain |
+//! | `softening.rs` | strength that falls or grows with plastic strain |
 //! | `parameter.rs` | [`Parameter`]: what it reads from the deck |
 //! | `mod.rs` | the catalogue: a model is one file and one line here |
 //!

@@ -7,13 +7,14 @@
 //! tangent D - D G (N D G)^-1 N D. The order of the plane's result names the edge; an edge's result
 //! beyond the apex p = c cot phi names the apex. Three planes hold a stress fixed: no tangent.
 //!
-//! With `softening` cohesion and angles fall with the plastic strain: [`super::softening`]. At a fixed
+//! With `softening` cohesion and angles fall with the plastic strain, with `hardening` the cohesion grows:
+//! [`super::softening`]. At a fixed
 //! trial stress the return then changes with the planes, at the rate
 //! tau' = -D G' l - D G l', l' = (N D G)^-1 (N' tau - k' - N D G' l), l the multipliers.
 
 use super::model::elastic_by;
 use super::parameter::{Absence, POISSON, POSITIVE, Parameter, Range, YOUNG, at_least};
-use super::softening::{self, Falling};
+use super::softening::{self, Change, check_hardening};
 use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
 
 /// A trial state counts as plastic when it lies outside a plane by more than this share of the
@@ -58,19 +59,8 @@ pub struct MohrCoulomb {
     apex: f64,
     /// Pa
     tension: f64,
-    /// `None`: the strength stays.
-    softening: Option<Softening>,
-}
-
-/// How the strength falls.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Softening {
-    /// Where the fall ends.
-    strain: f64,
-    /// Angles in rad, cohesion in Pa.
-    friction: Falling,
-    dilation: Falling,
-    cohesion: Falling,
+    /// Angles in rad, cohesion in Pa; `None`: the strength stays.
+    change: Option<Change>,
 }
 
 /// Rates, with κ, of the fields of [`MohrCoulomb`] of these names.
@@ -133,7 +123,7 @@ impl MohrCoulomb {
             strength: 2.0 * cohesion * phi.cos(),
             apex,
             tension,
-            softening: None,
+            change: None,
         }
     }
 
@@ -331,16 +321,14 @@ impl MohrCoulomb {
     }
 
     /// The perfect surface of κ, and its rates.
-    fn softened(&self, softening: &Softening, kappa: f64) -> (MohrCoulomb, Rates) {
-        let at = |falling: &Falling| falling.at(kappa, softening.strain);
-        let ([phi, phi_rate], [psi, psi_rate]) = (at(&softening.friction), at(&softening.dilation));
-        let [cohesion, cohesion_rate] = at(&softening.cohesion);
+    fn surface(&self, change: &Change, kappa: f64) -> (MohrCoulomb, Rates) {
+        let [[phi, phi_rate], [psi, psi_rate], [cohesion, cohesion_rate]] = change.at(kappa);
         let surface = MohrCoulomb {
             sine: phi.sin(),
             dilation: psi.sin(),
             strength: 2.0 * cohesion * phi.cos(),
             apex: if phi > 0.0 { cohesion / phi.tan() } else { f64::INFINITY },
-            softening: None,
+            change: None,
             ..*self
         };
         let apex = match phi > 0.0 {
@@ -352,24 +340,21 @@ impl MohrCoulomb {
         (surface, Rates { sine, dilation, strength, apex })
     }
 
-    /// The law with residual values (angles in degrees, cohesion in Pa; not a number where one
-    /// stays), reached at κ = `strain`.
-    pub fn softening(self, strain: f64, [friction, dilation, cohesion]: [[f64; 2]; 3]) -> Self {
-        let angle = |[peak, end]: [f64; 2]| Falling::new(peak.to_radians(), end.to_radians());
-        let softening = strain.is_finite().then(|| Softening {
-            strain,
-            friction: angle(friction),
-            dilation: angle(dilation),
-            cohesion: Falling::new(cohesion[0], cohesion[1]),
-        });
-        MohrCoulomb { softening, ..self }
+    /// The law whose strength changes: [`Change::new`], angles in degrees.
+    pub(super) fn changing(self, strain: f64, hardening: f64, values: [[f64; 2]; 3]) -> Self {
+        let [friction, dilation, cohesion] = values;
+        let [friction, dilation] = [friction, dilation].map(|angle| angle.map(f64::to_radians));
+        MohrCoulomb {
+            change: Change::new(strain, hardening, [friction, dilation, cohesion]),
+            ..self
+        }
     }
 
     /// [`Model::respond`] from κ on.
     #[inline(never)]
-    fn respond_softening(&self, softening: &Softening, trial: [f64; 3], kappa: f64) -> Response {
-        softening::respond(&self.elasticity, trial, (kappa, softening.strain), |kappa| {
-            let (surface, rates) = self.softened(softening, kappa);
+    fn respond_changing(&self, change: &Change, trial: [f64; 3], kappa: f64) -> Response {
+        softening::respond(&self.elasticity, trial, (kappa, change), |kappa| {
+            let (surface, rates) = self.surface(change, kappa);
             surface.respond_with_rate(trial, Some(rates))
         })
     }
@@ -455,8 +440,8 @@ fn inverse<const K: usize>(matrix: [[f64; K]; K]) -> [[f64; K]; K] {
 
 impl Model for MohrCoulomb {
     const NAME: &'static str = "mohr-coulomb";
-    const DOC: &'static str = "Hencky elasticity with Mohr-Coulomb plasticity, perfect or softening, \
-        non-associated where dilation differs from friction, and an optional tension cut-off \
+    const DOC: &'static str = "Hencky elasticity with Mohr-Coulomb plasticity, perfect, softening or \
+        hardening, non-associated where dilation differs from friction, and an optional tension cut-off \
         (associated).";
     const PARAMETERS: &'static [Parameter] = &[
         STIFF,
@@ -470,20 +455,22 @@ impl Model for MohrCoulomb {
         softening::FRICTION,
         softening::DILATION,
         softening::LENGTH,
+        softening::HARDENING,
     ];
     const STATE: &'static [StateVariable] = &[softening::KAPPA];
 
     fn new(p: &[f64]) -> Self {
         let law = Self::with(Hencky::new(p[0], p[1]), p[2], p[3], p[4], p[5]);
-        law.softening(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])
+        law.changing(p[6], p[11], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])
     }
 
     fn state_words(&self) -> usize {
-        usize::from(self.softening.is_some())
+        usize::from(self.change.is_some())
     }
 
     fn check(p: &[f64]) -> Result<(), Misfit> {
         check_cone(p[2], p[3], p[4])?;
+        check_hardening(p[6], p[11])?;
         let [friction, _, cohesion] =
             check_residual(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])?;
         let apex = (p[4] / p[2].to_radians().tan()).min(cohesion / friction.to_radians().tan());
@@ -500,16 +487,16 @@ impl Model for MohrCoulomb {
 
     #[inline]
     fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
-        match &self.softening {
+        match &self.change {
             None => self.respond_perfectly(trial),
-            Some(softening) => self.respond_softening(softening, trial, state[0]),
+            Some(change) => self.respond_changing(change, trial, state[0]),
         }
     }
 
     elastic_by!(elasticity);
 
     fn symmetric(&self) -> bool {
-        self.sine == self.dilation && self.softening.is_none()
+        self.sine == self.dilation && self.change.is_none()
     }
 }
 

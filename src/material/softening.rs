@@ -1,5 +1,5 @@
-//! Strength that falls linearly with the accumulated deviatoric plastic strain: κ' - κ = Δ(κ'), where
-//! Δ is sqrt(2/3) times the norm of the deviatoric plastic strain of the return to the perfect surface
+//! Strength that falls linearly with the accumulated deviatoric plastic strain, or a cohesion that grows
+//! with it: κ' - κ = Δ(κ'), where Δ is sqrt(2/3) times the norm of the deviatoric plastic strain of the return to the perfect surface
 //! of κ' (formulations.md B.1).
 //!
 //! With r = d tau / d κ' at a fixed trial strain and Δ_ε, Δ_κ the derivatives of Δ, the consistent
@@ -11,11 +11,11 @@
 //! from following the cells.
 
 use super::parameter::{Absence, Parameter, at_least};
-use super::{Hencky, Response, StateVariable};
+use super::{Hencky, Misfit, Response, StateVariable};
 
 /// Newton steps, or halvings, of a return.
 const MOST_ITERATIONS: usize = 60;
-/// Of κ, in units of the strain over which the strength falls.
+/// Of κ, in units of the strain over which the strength falls, or of the trial strain.
 const PRECISION: f64 = 1e-14;
 
 /// The state variable.
@@ -53,35 +53,98 @@ pub(super) const FRICTION: Parameter =
 pub(super) const DILATION: Parameter =
     residual("softening.dilation", "degrees", "Residual angle of dilation.");
 
-/// A value that falls from its peak to a residual one.
+/// Needs no length: flow of hardening material spreads.
+pub(super) const HARDENING: Parameter = Parameter::new(
+    "hardening",
+    "Pa",
+    at_least(0.0),
+    "Growth of the cohesion per accumulated deviatoric plastic strain (sqrt(2/3) of its norm); not beside \
+     `softening`.",
+)
+.absent(0.0, "0");
+
+/// A value that changes linearly with κ, to a last one or without end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Falling {
-    peak: f64,
-    residual: f64,
+pub(super) struct Linear {
+    first: f64,
+    last: f64,
+    rate: f64,
 }
 
-impl Falling {
-    /// `residual` is not a number where the value stays.
-    pub fn new(peak: f64, residual: f64) -> Self {
-        Falling { peak, residual: if residual.is_nan() { peak } else { residual } }
+impl Linear {
+    fn steady(value: f64) -> Self {
+        Linear { first: value, last: value, rate: 0.0 }
     }
 
-    /// The value at κ, and its rate; `strain`: where the fall ends.
-    pub fn at(&self, kappa: f64, strain: f64) -> [f64; 2] {
-        if kappa >= strain {
-            return [self.residual, 0.0];
+    /// `residual` is not a number where the value stays; `strain`: where the fall ends.
+    fn falling(peak: f64, residual: f64, strain: f64) -> Self {
+        match residual.is_nan() {
+            true => Linear::steady(peak),
+            false => Linear { first: peak, last: residual, rate: (residual - peak) / strain },
         }
-        let rate = (self.residual - self.peak) / strain;
-        [self.peak + rate * kappa, rate]
     }
+}
+
+/// How strength changes with κ.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Change {
+    /// Where it ends; infinite for a cohesion that grows.
+    strain: f64,
+    friction: Linear,
+    dilation: Linear,
+    cohesion: Linear,
+}
+
+impl Change {
+    /// Of peak and residual values (angle of friction, of dilation, cohesion; not a number where one
+    /// stays) that are reached at κ = `strain`, or of a cohesion that grows at the rate `hardening`.
+    /// `None`: the strength stays.
+    pub fn new(strain: f64, hardening: f64, values: [[f64; 2]; 3]) -> Option<Self> {
+        if strain.is_finite() {
+            let [friction, dilation, cohesion] =
+                values.map(|[peak, residual]| Linear::falling(peak, residual, strain));
+            return Some(Change { strain, friction, dilation, cohesion });
+        }
+        let [friction, dilation, mut cohesion] = values.map(|[value, _]| Linear::steady(value));
+        cohesion.rate = hardening;
+        (hardening > 0.0).then_some(Change { strain, friction, dilation, cohesion })
+    }
+
+    /// Angle of friction, of dilation, and cohesion at κ, each with its rate.
+    pub fn at(&self, kappa: f64) -> [[f64; 2]; 3] {
+        [self.friction, self.dilation, self.cohesion].map(|value| match kappa < self.strain {
+            true => [value.first + value.rate * kappa, value.rate],
+            false => [value.last, 0.0],
+        })
+    }
+
+    /// A κ that no return from κ = `kappa` passes, `flow` being the one to the surface of `kappa`.
+    fn most(&self, kappa: f64, flow: f64, at: impl Fn(f64) -> f64) -> f64 {
+        kappa + if self.strain.is_finite() { at(self.strain) } else { flow }
+    }
+
+    /// To which a return's κ is found; `trial`: the elastic trial strain.
+    fn precision(&self, kappa: f64, trial: [f64; 3]) -> f64 {
+        let size = trial.iter().fold(kappa, |most, strain| most.max(strain.abs()));
+        PRECISION * if self.strain.is_finite() { self.strain.min(1.0) } else { size }
+    }
+}
+
+/// A growing cohesion beside one that falls is refused.
+pub(super) fn check_hardening(strain: f64, hardening: f64) -> Result<(), Misfit> {
+    if strain.is_finite() && hardening > 0.0 {
+        let why = "the cohesion would grow and fall: expected either `hardening` or `softening`";
+        return Err(Misfit { key: "hardening", why: why.into() });
+    }
+    Ok(())
 }
 
 /// The response from κ on. `perfect` gives that of the surface of a κ to the trial strain, and the
-/// rate of its stress with κ; `strain`: where the fall ends.
+/// rate of its stress with κ.
 pub(super) fn respond(
     elasticity: &Hencky,
     trial: [f64; 3],
-    (kappa, strain): (f64, f64),
+    (kappa, change): (f64, &Change),
     perfect: impl Fn(f64) -> (Response, [f64; 3]),
 ) -> Response {
     let first = perfect(kappa);
@@ -89,14 +152,17 @@ pub(super) fn respond(
     let mut found = first;
     let mut end = kappa;
     if plastic {
-        let (mut low, mut high) = (kappa, kappa + flow(trial, &perfect(strain).0).0);
-        end = kappa + flow(trial, &found.0).0;
+        let size = flow(trial, &found.0).0;
+        let most = change.most(kappa, size, |kappa| flow(trial, &perfect(kappa).0).0);
+        let precision = change.precision(kappa, trial);
+        let (mut low, mut high) = (kappa, most);
+        end = kappa + size;
         for _ in 0..MOST_ITERATIONS {
             end = if end > low && end < high { end } else { 0.5 * (low + high) };
             found = perfect(end);
             let (size, direction) = flow(trial, &found.0);
             let off = end - kappa - size;
-            if off.abs() <= PRECISION * strain.min(1.0) || high - low <= f64::EPSILON * high {
+            if off.abs() <= precision || high - low <= f64::EPSILON * high {
                 break;
             }
             if off < 0.0 {

@@ -1,4 +1,4 @@
-//! Softening laws: tangents against differences, residual strength, closed forms, bad parameters.
+//! Softening and hardening laws: tangents against differences, residual strength, closed forms, bad parameters.
 
 #![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
 
@@ -33,7 +33,13 @@ fn laws() -> Vec<Material> {
     ];
     let with =
         |name: &str, more: &[(&str, f64)]| law(name, &[&elastic[..], &cone[..], more].concat()).1;
+    let hardening = |name: &str| {
+        let cone = &cone[..3];
+        law(name, &[&elastic[..], cone, &[("hardening", 3e3)]].concat()).1
+    };
     vec![
+        hardening("mohr-coulomb"),
+        hardening("drucker-prager"),
         with("mohr-coulomb", &[]),
         with("mohr-coulomb", &[("tension", 1.0)]),
         with("drucker-prager", &[]),
@@ -119,6 +125,41 @@ fn the_stress_is_that_of_the_fallen_strength() {
     assert!(strengths.is_sorted_by(|a, b| a >= b) && state > 0.02);
 }
 
+/// In pure shear by e, tau = 2 G (e - l) = c + H 2 l / sqrt(3), l the plastic strain: in one step or in many.
+#[test]
+fn cohesion_grows_with_the_plastic_strain() {
+    let (cohesion, rise, shear) = (10.0, 3e3, YOUNG / 2.6);
+    let given = [
+        ("young", YOUNG),
+        ("poisson", 0.3),
+        ("friction", 0.0),
+        ("dilation", 0.0),
+        ("cohesion", cohesion),
+        ("hardening", rise),
+    ];
+    for name in ["mohr-coulomb", "drucker-prager"] {
+        let (_, law) = law(name, &given);
+        for steps in [1, 40] {
+            let (mut strain, mut state) = ([0.0; 3], 0.0);
+            let total = 2e-3;
+            for _ in 0..steps {
+                let more = total / steps as f64;
+                let response =
+                    law.respond([strain[0] + more, strain[1], strain[2] - more], &[state]);
+                (strain, state) = (response.elastic_strain, response.state[0]);
+            }
+            let slope = 2.0 / 3.0f64.sqrt();
+            let plastic = (2.0 * shear * total - cohesion) / (2.0 * shear + slope * rise);
+            let tau = 2.0 * shear * strain[0];
+            assert!(
+                (tau / (cohesion + slope * rise * plastic) - 1.0).abs() < 1e-12,
+                "{name}: {tau}"
+            );
+            assert!((state / (slope * plastic) - 1.0).abs() < 1e-12, "{name}: {state}");
+        }
+    }
+}
+
 /// A fall steeper than the elasticity can follow still ends on the surface.
 #[test]
 fn a_steep_fall_ends_at_the_residual_strength() {
@@ -156,6 +197,7 @@ fn residual_values_that_do_not_fit_are_named() {
     };
     assert_eq!(check(&[("softening.cohesion", 5.0), ("softening.dilation", 0.0)]), Ok(()));
     assert_eq!(check(&[("softening.cohesion", 11.0)]), Err("softening.cohesion"));
+    assert_eq!(check(&[("hardening", 5.0)]), Err("hardening"));
     assert_eq!(check(&[("softening.friction", 5.0)]), Err("softening.dilation"));
     assert_eq!(check(&[("softening.cohesion", 1.0), ("tension", 5.0)]), Err("tension"));
 }

@@ -38,7 +38,7 @@ impl Model for Tresca {
     fn new(p: &[f64]) -> Self {
         let elasticity = Hencky::new(p[0], p[1]);
         let pyramid = MohrCoulomb::with(elasticity, 0.0, 0.0, p[2], f64::INFINITY);
-        let pyramid = pyramid.softening(p[3], [[0.0; 2], [0.0; 2], [p[2], p[4]]]);
+        let pyramid = pyramid.changing(p[3], 0.0, [[0.0; 2], [0.0; 2], [p[2], p[4]]]);
         Tresca { pyramid, strength: p[2] }
     }
 

@@ -76,9 +76,8 @@ enum Strength {
 /// What a key of a material is to a strength reduction.
 fn strength_of(key: &str) -> Option<Strength> {
     match key.rsplit('.').next().unwrap_or(key) {
-        "cohesion" | "tension" | "shear_strength" | "yield" | "yield_stress" => {
-            Some(Strength::Stress)
-        }
+        "cohesion" | "tension" | "shear_strength" | "yield" | "yield_stress" | "hardening"
+        | "stress" => Some(Strength::Stress),
         "friction" | "dilation" => Some(Strength::Angle),
         _ => None,
     }
