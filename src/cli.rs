@@ -139,9 +139,12 @@ pub struct Plot {
     /// The results directory
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Points by this field: stress.yy, |displacement|, J
-    #[arg(long, value_name = "FIELD", required_unless_present = "columns")]
+    /// Points by this field: stress.yy, displacement (its length), J
+    #[arg(long, value_name = "FIELD")]
     pub field: Option<String>,
+    /// Draw the domains of the points, with their outlines, in place of squares
+    #[arg(long, requires = "field")]
+    pub domains: bool,
     /// Step of the frame (default: the last)
     #[arg(long, value_name = "N", requires = "field")]
     pub step: Option<usize>,
@@ -158,9 +161,9 @@ pub struct Plot {
     /// Curves: columns of a table, by their names without units, separated by commas
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', conflicts_with = "field")]
     pub columns: Vec<String>,
-    /// The table of the curves: history, probes, residuals, element
-    #[arg(long, value_name = "TABLE", default_value = "history")]
-    pub table: String,
+    /// The table of the curves: history, probes, residuals, element (default: history, or what there is)
+    #[arg(long, value_name = "TABLE")]
+    pub table: Option<String>,
     /// Column across (default: the first of time, load_factor and step that grows from row to row)
     #[arg(long, value_name = "NAME")]
     pub x: Option<String>,

@@ -9,7 +9,7 @@ use mpm_par::deck::templates::template_of;
 /// Template; what is replaced in it; by what; exit code of `--check`; words that are said.
 type Mistake = (&'static str, &'static str, &'static str, i32, &'static [&'static str]);
 
-const MISTAKES: [Mistake; 20] = [
+const MISTAKES: [Mistake; 38] = [
     // Slips of the pen.
     (
         "beam",
@@ -101,6 +101,69 @@ const MISTAKES: [Mistake; 20] = [
         0,
         &["out of balance", "most at [1.0, 6.0] m"],
     ),
+    // Habits of other programs.
+    ("beam", "young = 12e6", "E = 12e6", 2, &["unknown key \"E\"", "here it is called \"young\""]),
+    ("beam", "poisson", "nu", 2, &["unknown key \"nu\"", "here it is called \"poisson\""]),
+    (
+        "column-collapse",
+        "friction = 31.0",
+        "phi = 31.0",
+        2,
+        &["unknown key \"phi\"", "here it is called \"friction\""],
+    ),
+    (
+        "column-collapse",
+        "duration = 0.6",
+        "duration = 0.6\ndt = 1e-4",
+        2,
+        &["unknown key \"dt\"", "duration over steps", "cfl"],
+    ),
+    ("slope", "h = 1.0", "cell_size = 1.0", 2, &["grid.h", "here it is called \"h\""]),
+    (
+        "beam",
+        "model = \"hencky\"",
+        "model = \"linear-elastic\"",
+        2,
+        &["material.rubber.model", "here it is called \"hencky\""],
+    ),
+    ("slope", "\"stress\"", "\"sigma\"", 2, &["output.fields", "here it is called \"stress\""]),
+    (
+        "slope",
+        "side = \"bottom\"",
+        "side = \"base\"",
+        2,
+        &["boundary.0.where.side", "here it is called \"bottom\""],
+    ),
+    // Numbers.
+    ("slope", "young = 10e6", "young = 10 MPa", 2, &["slope.toml:25", "carry no unit", "10e6"]),
+    ("slope", "young = 10e6", "young = \"10 MPa\"", 2, &["material.clay.young", "carry no unit"]),
+    ("slope", "density = 1835.0", "density = 1835,0", 2, &["slope.toml:32", "density = 1835.0"]),
+    ("slope", "density = 1835.0", "density = -1835.0", 2, &["body.0.density", ">= 0 (kg/m3)"]),
+    ("slope", "-9.81", "9.81", 0, &["acts towards +y", "side \"bottom\"", "[0, -9.81]"]),
+    // Brackets and names.
+    (
+        "slope",
+        "[material.clay]",
+        "[[material]]",
+        2,
+        &["material: expected tables", "[material.NAME]"],
+    ),
+    ("slope", "[[load]]", "[load]", 2, &["load: expected an array", "write [[load]]"]),
+    (
+        "beam",
+        "shape = { box = { min = [0, 9], max = [10, 10] } }",
+        "shape = { points = \"C:\\data\\p.csv\" }",
+        2,
+        &["beam.toml:31", "'single quotes'"],
+    ),
+    (
+        "beam",
+        "min = [0, 9], max = [10, 10]",
+        "min = [0, 10], max = [10, 9]",
+        2,
+        &["body.0.shape.box.max", "more than min = 10 along y"],
+    ),
+    ("beam", "name = \"pin\"", "name = \"root\"", 2, &["boundary.1.name", "another boundary"]),
 ];
 
 #[test]
@@ -229,6 +292,56 @@ fields = ["displacement.y"]
     let bar = bar.replace("[8, 1.6]", "[8, 0.5]").replace("[8, 1.35]", "[8, 0.25]")
         + "[[boundary]]\nwhere = { side = \"bottom\" }\nfix = [\"y\"]\n";
     assert!(!said(&bar).contains("cells thick"), "{}", said(&bar));
+}
+
+/// Lengths in mm beside density, gravity and stiffness in SI units.
+#[test]
+fn lengths_in_mm_are_told() {
+    let said = |text: &str| {
+        let outcome = Run::text(text).word("--check").attempt();
+        assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+        outcome.stdout
+    };
+    let slope = template_of("slope").expect("a template").text;
+    let in_mm = |text: &str, sizes: &[(&str, &str)]| {
+        sizes.iter().fold(text.to_string(), |text, (from, to)| {
+            assert!(text.contains(from), "{from}");
+            text.replacen(from, to, 1)
+        })
+    };
+    let sizes = [
+        ("size = [35.0, 12.0]", "size = [35000.0, 12000.0]"),
+        ("h = 1.0", "h = 1000.0"),
+        (
+            "[[0, 0], [35, 0], [35, 5], [15, 5], [10, 10], [0, 10]]",
+            "[[0, 0], [35000, 0], [35000, 5000], [15000, 5000], [10000, 10000], [0, 10000]]",
+        ),
+        ("near = [9.9, 9.9]", "near = [9900, 9900]"),
+    ];
+    let found = said(&in_mm(slope, &sizes));
+    assert!(found.contains("rho g H / E = 18") && found.contains("lengths (m)"), "{found}");
+    // Stiff rock: its ratios are usual ones.
+    let rock = in_mm(slope, &[("young = 10e6", "young = 1e10")]);
+    let rock = in_mm(&rock, &[("shear_strength = 25e3", "shear_strength = 25e6")]);
+    assert!(!said(&rock).contains("warning"), "{}", said(&rock));
+    let found = said(&in_mm(&rock, &sizes));
+    assert!(found.contains("35000 m long") && found.contains("is it in mm?"), "{found}");
+    // A column of 0.1 by 0.2 m that does not move within the time of its fall.
+    let column = template_of("column-collapse").expect("a template").text;
+    assert!(!said(column).contains("hardly anything"));
+    let found = said(&in_mm(
+        column,
+        &[
+            ("size = [0.6, 0.24]", "size = [600, 240]"),
+            ("h = 0.01", "h = 10"),
+            ("max = [0.1, 0.2]", "max = [100, 200]"),
+            ("near = [0.0, 0.2]", "near = [0, 200]"),
+        ],
+    ));
+    assert!(
+        found.contains("hardly anything will happen") && found.contains("lengths (m)"),
+        "{found}"
+    );
 }
 
 /// Mistakes on the command line.

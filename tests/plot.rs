@@ -43,6 +43,13 @@ fn points_and_curves_are_drawn() {
     good(out, &[&probes[..], &["-o", &file("d.png")]].concat());
     good(out, &["--table", "residuals", "--columns", "residual", "--log", "-o", &file("e.svg")]);
 
+    // A vector by its name is its length, and a domain is a polygon and its outline.
+    good(out, &["--field", "displacement", "--step", "2", "-o", &file("f.svg")]);
+    let text = |name: &str| std::fs::read_to_string(out.join(name)).expect("text");
+    assert_eq!(text("f.svg"), text("b.svg"));
+    good(out, &["--field", "displacement", "--domains", "-o", &file("g.svg")]);
+    assert_eq!(text("g.svg").matches("<polygon").count(), 360);
+
     // The tip is lowest and has moved down most: the darkest colour; the root the brightest.
     let (width, height, colours) = pixels(&out.join("a.png"));
     let count = |colour: [u8; 3]| colours.iter().filter(|c| **c == colour).count();
@@ -71,7 +78,8 @@ fn points_and_curves_are_drawn() {
         (&["--field", "stress.xx", "--step", "3", "-o", "x.png"], "there are those of 0, 2, 4"),
         (&["--field", "stress.xx", "-o", "x.pdf"], "ends in .png or .svg"),
         (&["--columns", "energy", "-o", "x.png"], "no column \"energy\""),
-        (&["-o", "x.png"], "--field"),
+        (&["-o", "x.png"], "--field, points of a frame: |displacement|"),
+        (&["-o", "x.png"], "--columns, curves of history.csv: step"),
     ] {
         let output = plot(out, words);
         let text = String::from_utf8_lossy(&output.stderr).into_owned();

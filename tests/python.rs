@@ -86,10 +86,31 @@ fn the_package_reads_what_a_run_has_written() {
         let script =
             "import mpm_par, sys; mpm_par.open(sys.argv[1]).plot('stress.xx', save='a.png')";
         good(&python(&["-c", script, &directory], results.directory.as_path()));
-        let picture = std::fs::read(results.directory.join("a.png")).expect("a picture");
-        assert!(picture.starts_with(b"\x89PNG") && picture.len() > 10_000);
+        let picture = |name: &str| {
+            let bytes = std::fs::read(results.directory.join(name)).expect("a picture");
+            assert!(bytes.starts_with(b"\x89PNG") && bytes.len() > 10_000, "{name}");
+            bytes
+        };
+        let script = "import mpm_par, sys\n\
+            mpm_par.open(sys.argv[1]).plot('stress.xx', save='b.png', domains=True)";
+        good(&python(&["-c", script, &directory], results.directory.as_path()));
+        assert_ne!(picture("a.png"), picture("b.png"));
     } else {
         println!("plot: not run: {} has no matplotlib", python_name());
+    }
+    if has("pyvista") {
+        // The domains of 360 points fill the beam of 10 m2, but for what it stretches.
+        let script = "import mpm_par, sys, numpy as np\n\
+            frame = mpm_par.open(sys.argv[1]).points(-1)\n\
+            cloud, domains = frame.cloud(), frame.domains()\n\
+            assert cloud.n_points == domains.n_cells == 360\n\
+            assert np.array_equal(cloud.point_data['stress'], frame['stress'])\n\
+            areas = domains.compute_cell_sizes(length=False, volume=False).cell_data['Area']\n\
+            assert abs(areas.sum() - 10) < 0.2, areas.sum()\n\
+            assert np.abs(domains.cell_centers().points - frame.position).max() < 1e-6";
+        good(&python(&["-c", script, &directory], results.directory.as_path()));
+    } else {
+        println!("cloud: not run: {} has no pyvista", python_name());
     }
 }
 

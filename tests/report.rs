@@ -44,8 +44,9 @@ fn the_page_holds_what_the_run_has_written() {
     let results = beam().ranks(2).results();
     let page = results.text("report.html");
     assert!(page.starts_with("<!doctype html>\n") && page.trim_end().ends_with("</html>"));
-    // Nothing is fetched; uPlot's licence travels with it.
+    // Nothing is fetched; the licences of uPlot and OGL travel with it.
     assert!(page.contains("The MIT License (MIT)") && page.contains("Leon Sorokin"));
+    assert!(page.contains("https://unlicense.org"));
     for outside in ["<script src", "<link", "@import", "fetch(", "url("] {
         assert!(!page.contains(outside), "{outside}");
     }
@@ -224,7 +225,7 @@ fn browser() -> Option<PathBuf> {
 }
 
 /// The page after `script`, which ends by a text in the element `said`.
-fn browsed(browser: &Path, page: &str, script: &str) -> String {
+fn browsed(browser: &Path, page: &str, script: &str, flag: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("page.html");
     let added = format!(
@@ -235,7 +236,7 @@ fn browsed(browser: &Path, page: &str, script: &str) -> String {
     );
     std::fs::write(&path, page.replace("</body>", &added)).unwrap();
     let output = Command::new(browser)
-        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"])
+        .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", flag])
         .arg(format!("--user-data-dir={}", folder.path().join("profile").display()))
         .args(["--window-size=1000,900", "--virtual-time-budget=4000", "--dump-dom"])
         .arg(format!("file://{}", path.display()))
@@ -246,7 +247,8 @@ fn browsed(browser: &Path, page: &str, script: &str) -> String {
     said.unwrap_or_else(|| panic!("{}", String::from_utf8_lossy(&output.stderr))).to_string()
 }
 
-/// Moves the slider, changes the field, turns the body, and reads pixels, without a mouse.
+/// Moves the slider, changes the field, turns the body, and reads pixels, without a mouse; where a browser has
+/// WebGL and where it has none.
 #[test]
 fn a_browser_shows_the_points_and_its_controls_change_them() {
     let Some(browser) = browser() else {
@@ -276,7 +278,7 @@ fn a_browser_shows_the_points_and_its_controls_change_them() {
         key('ArrowLeft'); seen.push(pixels());
         key('.'); const stepped = canvas.dataset.frame; key(',');
         key('0'); seen.push(pixels());
-        said(JSON.stringify({ seen, moved, stepped, drawn: canvas.dataset.drawn, field: canvas.dataset.field,
+        said(JSON.stringify({ seen, moved, stepped, drawn: canvas.dataset.drawn, field: canvas.dataset.field, painter: canvas.dataset.painter,
             label: canvas.getAttribute('aria-label'), plots: document.querySelectorAll('#curves .uplot').length,
             outcome: document.getElementById('outcome').textContent,
             facts: document.getElementById('facts').textContent,
@@ -291,24 +293,30 @@ fn a_browser_shows_the_points_and_its_controls_change_them() {
             ["kg,", "m3"],
         ),
     ] {
-        let results = run.results();
-        let said = browsed(&browser, &results.text("report.html"), script);
-        let found: Value = serde_json::from_str(&said.replace("&lt;", "<").replace("&gt;", ">"))
-            .unwrap_or_else(|_| panic!("{said}"));
-        let seen: Vec<(u64, u64)> = serde_json::from_value(found["seen"].clone()).unwrap();
-        assert!(seen.iter().all(|(coloured, _)| *coloured > 2000), "{said}");
-        // Frame, field and view each change the picture; the reset brings it back.
-        for (a, b) in [(0, 1), (1, 2), (2, 3)] {
-            assert_ne!(seen[a].1, seen[b].1, "{a} {b}: {said}");
+        let page = run.results().text("report.html");
+        for (flag, painter) in
+            [("--enable-unsafe-swiftshader", "webgl"), ("--disable-3d-apis", "squares")]
+        {
+            let said = browsed(&browser, &page, script, flag);
+            let found: Value =
+                serde_json::from_str(&said.replace("&lt;", "<").replace("&gt;", ">"))
+                    .unwrap_or_else(|_| panic!("{said}"));
+            let seen: Vec<(u64, u64)> = serde_json::from_value(found["seen"].clone()).unwrap();
+            assert!(seen.iter().all(|(coloured, _)| *coloured > 2000), "{said}");
+            // Frame, field and view each change the picture; the reset brings it back.
+            for (a, b) in [(0, 1), (1, 2), (2, 3)] {
+                assert_ne!(seen[a].1, seen[b].1, "{a} {b}: {said}");
+            }
+            assert_eq!(seen[2], seen[4], "{said}");
+            assert_eq!([&found["moved"], &found["stepped"]], steps, "{said}");
+            assert_eq!(found["field"], "stress.xx");
+            assert_eq!(found["reachable"], true);
+            assert!(found["plots"].as_u64().unwrap() >= 3, "{said}");
+            assert!(found["outcome"].as_str().unwrap().starts_with("completed"), "{said}");
+            let facts = found["facts"].as_str().unwrap();
+            assert!(units.iter().all(|unit| facts.contains(&format!(" {unit}"))), "{facts}");
+            assert!(points.is_empty() || found["drawn"] == points, "{said}");
+            assert_eq!(found["painter"], painter, "{said}");
         }
-        assert_eq!(seen[2], seen[4], "{said}");
-        assert_eq!([&found["moved"], &found["stepped"]], steps, "{said}");
-        assert_eq!(found["field"], "stress.xx");
-        assert_eq!(found["reachable"], true);
-        assert!(found["plots"].as_u64().unwrap() >= 3, "{said}");
-        assert!(found["outcome"].as_str().unwrap().starts_with("completed"), "{said}");
-        let facts = found["facts"].as_str().unwrap();
-        assert!(units.iter().all(|unit| facts.contains(&format!(" {unit}"))), "{facts}");
-        assert!(points.is_empty() || found["drawn"] == points, "{said}");
     }
 }

@@ -327,13 +327,15 @@ fn output_and_solver_settings_may_change() {
     assert_eq!(summary(&other)["steps_completed"], 6);
 }
 
-/// SIGUSR1 and SIGTERM: a checkpoint at the end of the step, status "stopped", and on we go.
+/// SIGUSR1, SIGTERM and SIGINT: a checkpoint at the end of the step, status "stopped", and on we go.
 #[test]
 fn signals_stop_a_run_in_good_order() {
     let folder = tempfile::tempdir().unwrap();
     let deck = deck("restart");
     let slow = ["--set", "analysis.steps=400", "--set", "output.every=400"];
-    for (signal, name) in [(libc::SIGUSR1, "SIGUSR1"), (libc::SIGTERM, "SIGTERM")] {
+    for (signal, name) in
+        [(libc::SIGUSR1, "SIGUSR1"), (libc::SIGTERM, "SIGTERM"), (libc::SIGINT, "SIGINT")]
+    {
         let out = folder.path().join(name);
         let mut running = Running::start(2, &deck, &out, &[&slow[..], &NEVER].concat());
         let rows = || fs::read_to_string(out.join("history.csv")).unwrap_or_default();

@@ -4,6 +4,7 @@
 use super::fields::{self, FIELDS};
 use super::problems::nearest;
 use super::schema::{self, Key, Kind, Need, Section};
+use super::synonyms;
 use crate::error::{Error, Result};
 use crate::material::{self, CATALOGUE, state_variables};
 
@@ -38,7 +39,9 @@ pub fn explain(word: &str) -> Result<String> {
     if parts.is_empty() {
         let known = names();
         let last = word.rsplit('.').next().unwrap_or(word);
-        let near = nearest(last, known.iter().map(String::as_str));
+        let near = synonyms::key(last, known.iter().map(String::as_str))
+            .or_else(|| synonyms::word(last, known.iter().map(String::as_str)))
+            .or_else(|| nearest(last, known.iter().map(String::as_str)));
         let hint = near.map_or(String::new(), |near| format!(": did you mean \"{near}\"?"));
         return Err(Error::Input(format!(
             "--explain: no key, model or field is called \"{word}\"{hint}\n    try: mpm-par --list, \

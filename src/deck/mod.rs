@@ -8,6 +8,7 @@
 //! | `schema/` | every key once: type, unit, default, range, meaning |
 //! | `tree.rs` | TOML to values with their places; `--set` |
 //! | `reader.rs`, `problems.rs` | typed access by the schema; messages with file, line, column |
+//! | `synonyms.rs`, `slips.rs` | what other programs call things; slips of the pen, and their cure |
 //! | `unread.rs` | keys that the deck's choices leave unread |
 //! | `marks.rs` | the text of a deck, and how a message points into it |
 //! | `places.rs` | where each key is written, for faults seen later |
@@ -43,8 +44,10 @@ mod resolved;
 pub mod schema;
 mod sections;
 pub(crate) mod shape;
+mod slips;
 pub(crate) mod solid;
 pub(crate) mod stage;
+mod synonyms;
 pub mod templates;
 mod tree;
 mod unread;
@@ -63,6 +66,7 @@ pub use sections::petsc::PREFIXES as PETSC_PREFIXES;
 pub use sections::shapes::corners;
 pub use sections::surfaces::body_surface;
 pub use shape::Shape;
+pub use slips::of_length;
 pub use stage::{Presence, Stage, When};
 pub use unread::is_read;
 
@@ -96,8 +100,9 @@ pub fn read(path: &Path, text: &str, sets: &[String]) -> Result<Deck> {
 
 fn checked(problems: &Problems, path: &Path, text: &str, sets: &[String]) -> problems::Got<Deck> {
     let mut root = tree::parse_document(text).map_err(|(span, message)| {
+        let cure = slips::cure(text, span.as_ref());
         let origin = span.map_or(Origin::Nowhere, Origin::Text);
-        problems.report(&origin, "", format!("not valid TOML: {message}"), String::new())
+        problems.report(&origin, "", format!("not valid TOML: {message}"), cure)
     })?;
     for (index, option) in sets.iter().enumerate() {
         tree::apply_set(&mut root, option, index)

@@ -1,26 +1,32 @@
 //! Signals that ask a run to end in good order: batch systems send SIGUSR1 or SIGTERM some time
-//! before they kill. A handler only notes the number; the time loop asks between two steps.
+//! before they kill, a terminal sends SIGINT for Ctrl-C. A handler only notes the number; the time loop asks
+//! between two steps. A second Ctrl-C ends the process at once.
 
-use std::sync::atomic::{AtomicI32, Ordering};
+use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering};
 
 use super::World;
 
 static NOTED: AtomicI32 = AtomicI32::new(0);
+/// Whether somebody reads what this process says.
+static IS_READ: AtomicBool = AtomicBool::new(false);
 
 /// A wish to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Signal {
     Terminate,
     User1,
+    Interrupt,
 }
 
 impl Signal {
-    const ALL: [Signal; 2] = [Signal::Terminate, Signal::User1];
+    const ALL: [Signal; 3] = [Signal::Terminate, Signal::User1, Signal::Interrupt];
 
     fn number(self) -> libc::c_int {
         match self {
             Signal::Terminate => libc::SIGTERM,
             Signal::User1 => libc::SIGUSR1,
+            Signal::Interrupt => libc::SIGINT,
         }
     }
 
@@ -28,16 +34,29 @@ impl Signal {
         match self {
             Signal::Terminate => "SIGTERM",
             Signal::User1 => "SIGUSR1",
+            Signal::Interrupt => "SIGINT",
         }
     }
 }
 
 extern "C" fn note(number: libc::c_int) {
     NOTED.store(number, Ordering::Relaxed);
+    if number != libc::SIGINT {
+        return;
+    }
+    // SAFETY: a signal handler may call signal() and write(); the text outlives the call.
+    unsafe {
+        libc::signal(libc::SIGINT, libc::SIG_DFL);
+        if IS_READ.load(Ordering::Relaxed) {
+            let text = b"\nstopping after this step; Ctrl-C again ends at once\n";
+            libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len());
+        }
+    }
 }
 
 /// From now on the signals are noted instead of ending the process.
 pub fn listen() {
+    IS_READ.store(std::io::stderr().is_terminal(), Ordering::Relaxed);
     for signal in Signal::ALL {
         let handler: extern "C" fn(libc::c_int) = note;
         // SAFETY: the handler only stores to an atomic, which a signal handler may do.

@@ -158,9 +158,15 @@ fn within_lattice<const D: usize>(
         for sub in 0..per_cell {
             if let Some(x) = sub_cells.inside(&sub_cell(cell, sub, counts)) {
                 let end: [f64; D] = std::array::from_fn(|a| lattice.end(a));
+                let longest = |side: &dyn Fn(usize) -> f64| (0..D).map(side).fold(0.0, f64::max);
+                let slip = crate::deck::of_length(
+                    longest(&|a| max[a] - min[a]),
+                    longest(&|a| end[a] - lattice.origin[a]),
+                );
+                let slip = if slip.is_empty() { slip } else { format!(";\n    {slip}") };
                 return Err(Error::Input(format!(
                     "body \"{}\" reaches outside the grid: its shape holds {x:?}, the grid goes \
-                     from {:?} to {end:?}; enlarge the grid, or move or cut the body",
+                     from {:?} to {end:?}; enlarge the grid, or move or cut the body{slip}",
                     body.name, lattice.origin
                 )));
             }

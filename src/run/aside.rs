@@ -70,11 +70,13 @@ fn draw(plot: &Plot) -> Result<()> {
     match &plot.field {
         Some(field) => draw_points(plot, field)?,
         None => {
-            let text = fs::read_to_string(plot.directory.join(format!("{}.csv", plot.table)));
-            let text = text.map_err(|reason| {
-                let table = plot.directory.join(format!("{}.csv", plot.table));
+            let table = plot.directory.join(format!("{}.csv", table_of(plot)));
+            let text = fs::read_to_string(&table).map_err(|reason| {
                 Error::File(format!("cannot read {}: {reason}", table.display()))
             })?;
+            if plot.columns.is_empty() {
+                return Err(nothing_chosen(plot, &text));
+            }
             let caption =
                 plot.directory.file_name().map(|name| name.to_string_lossy().into_owned());
             let curves =
@@ -85,9 +87,37 @@ fn draw(plot: &Plot) -> Result<()> {
     print(&format!("wrote {}", path.display()))
 }
 
+/// The table of the curves: an element test has no history.
+fn table_of(plot: &Plot) -> &str {
+    let is_there = |name: &str| plot.directory.join(format!("{name}.csv")).exists();
+    match &plot.table {
+        Some(table) => table,
+        None if is_there("element") && !is_there("history") => "element",
+        None => "history",
+    }
+}
+
+/// What there is to choose from.
+fn nothing_chosen(plot: &Plot, table: &str) -> Error {
+    let titles = table.lines().next().unwrap_or("").split(',');
+    let columns: Vec<&str> = titles.filter_map(|title| title.split(" [").next()).collect();
+    let fields = frames::read_one(&plot.directory, None, false).map(|frames| {
+        let names: Vec<&str> = frames.columns.iter().map(|column| column.name.as_str()).collect();
+        format!("\n    --field, points of a frame: {}", names.join(", "))
+    });
+    Error::Input(format!(
+        "what is to be drawn?{}\n    --columns, curves of {}.csv: {}",
+        fields.unwrap_or_default(),
+        table_of(plot),
+        columns.join(", ")
+    ))
+}
+
 fn draw_points(plot: &Plot, field: &str) -> Result<()> {
-    let frames = frames::read_one(&plot.directory, plot.step)?;
-    let Some(at) = frames.columns.iter().position(|column| column.name == field) else {
+    let frames = frames::read_one(&plot.directory, plot.step, plot.domains)?;
+    let column = |name: &str| frames.columns.iter().position(|column| column.name == name);
+    // A vector's own name means its length.
+    let Some(at) = column(field).or_else(|| column(&format!("|{field}|"))) else {
         let names: Vec<&str> = frames.columns.iter().map(|column| column.name.as_str()).collect();
         let known = names.join(", ");
         return Err(Error::Input(format!("the frame has no field \"{field}\"; it has {known}")));

@@ -11,7 +11,7 @@ use crate::system::model::Model;
 use crate::system::numbering::Numbering;
 use crate::system::populated::Populated;
 
-use super::{locking, plan_checks, thin};
+use super::{lengths, locking, plan_checks, thin};
 
 /// Counts the first step's system from its cells and nodes ([`crate::system::step_system::active`]).
 /// Collective.
@@ -39,6 +39,8 @@ pub fn of<const D: usize>(
     facts.extend(ratios.into_iter().flatten());
     warnings.extend(plan_checks::angles(&deck.materials).into_iter().map(Some));
     warnings.push(plan_checks::wrong_floor::<D>(deck));
+    warnings.push(plan_checks::upward::<D>(deck));
+    warnings.push(lengths::warning(world, model, points));
     warnings.push(plan_checks::unstable_step(world, model, points));
     warnings.push(plan_checks::much_output(output, frames));
     warnings.push(locking::warning(world, model, points));

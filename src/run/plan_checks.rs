@@ -22,7 +22,11 @@ const OVER_COHESION: [f64; 2] = [1e-6, 5e3];
 /// kg/m3: the densities of soils, rocks and metals in t/m3, at an acceleration (m/s2) that tells that
 /// the deck is in SI units.
 const FOAMS: RangeInclusive<f64> = 0.5..=25.0;
-const EARTH: RangeInclusive<f64> = 5.0..=15.0;
+pub const EARTH: RangeInclusive<f64> = 5.0..=15.0;
+/// kg/m3: from cork to heavy metals. With [`EARTH`] they tell that the deck is in SI units, in which no solid
+/// is so soft that rho g H / E passes 1.
+pub const SOLIDS: RangeInclusive<f64> = 200.0..=25e3;
+const SOFTEST: f64 = 1.0;
 /// Degrees: an angle of friction below is probably meant in radians.
 const RADIANS: f64 = 1.2;
 /// Result files beyond this are worth a second thought, bytes.
@@ -32,7 +36,7 @@ const MUCH_OUTPUT: f64 = 1e11;
 pub type Row = (Option<(String, String)>, Option<String>);
 
 /// Sum of all gravity, m/s2, as it is at the end of a quasi-static run, and at the start of a dynamic one.
-fn gravity<const D: usize>(deck: &Deck) -> [f64; D] {
+pub fn gravity<const D: usize>(deck: &Deck) -> [f64; D] {
     let when = When { factor: 1.0, ..When::default() };
     let at = Moment::new(deck.analysis.kind, Presence::default(), when);
     total_gravity(&deck.loads, at, &[0.0; D])
@@ -67,6 +71,31 @@ pub fn wrong_floor<const D: usize>(deck: &Deck) -> Option<String> {
     })
 }
 
+/// A warning of a weight away from the one side that bears it: gravity without its sign.
+pub fn upward<const D: usize>(deck: &Deck) -> Option<String> {
+    let gravity = gravity::<D>(deck);
+    let axis = (0..D).find(|&axis| gravity[axis] != 0.0)?;
+    if gravity[axis] < 0.0 || !deck.contacts.is_empty() {
+        return None;
+    }
+    let mut bears = false;
+    for boundary in deck.boundaries.iter().filter(|boundary| boundary.may_hold(axis)) {
+        match boundary.place {
+            Place::Side { axis: of, upper: false } if of == axis => bears = true,
+            Place::Side { axis: of, .. } if of != axis => {}
+            _ => return None,
+        }
+    }
+    let (name, side) = (AXES[axis], SIDES[2 * axis]);
+    let alone = (0..D).all(|other| other == axis || gravity[other] == 0.0);
+    (bears && alone).then(|| {
+        format!(
+            "the weight acts towards +{name}, away from side \"{side}\", which bears it: weight that acts \
+             downwards has a negative component, as in gravity = [0, -9.81]"
+        )
+    })
+}
+
 /// Weight of each body over its stiffness and strength, where gravity acts. Collective.
 pub fn weight_ratios<const D: usize>(
     world: &World,
@@ -95,7 +124,9 @@ pub fn weight_ratios<const D: usize>(
         if let Some(strength) = strength {
             text.push_str(&format!(", rho g H / strength = {}", rough(weight / strength)));
         }
-        let mut warning = unusual("rho g H / E", of_young, OVER_YOUNG);
+        let is_si = EARTH.contains(&size) && SOLIDS.contains(&body.density);
+        let range = if is_si { [OVER_YOUNG[0], SOFTEST] } else { OVER_YOUNG };
+        let mut warning = unusual("rho g H / E", of_young, range);
         if let Some(strength) = strength {
             let ratio = weight / strength;
             warning = warning.or(unusual("rho g H / strength", ratio, OVER_STRENGTH));

@@ -64,6 +64,9 @@ class Frame:
             return np.linalg.norm(self[selector.strip("|")], axis=1)
         name, _, part = selector.partition(".")
         values = self[name]
+        if values.ndim == 2 and values.shape[1] == 3 and not part and not name.startswith("principal"):
+            # A vector's own name means its length, as in mpm-par plot.
+            return np.linalg.norm(values, axis=1)
         if values.ndim == 1:
             if part:
                 raise KeyError(f"{name} is one number and has no component {part!r}")
@@ -72,6 +75,40 @@ class Frame:
         if part not in known:
             raise KeyError(f"{name} has the components {', '.join(known)}, not {part!r}")
         return values[:, known.index(part)]
+
+    @property
+    def corners(self):
+        """Corners of each point's domain, m: points by corners by x, y, z; None with the basis mpm."""
+        with h5py.File(self.path, "r") as file:
+            if "domain_corners" not in file:
+                return None
+            corners = file["domain_corners"][:]
+        return corners.reshape(len(self), -1, 3)[self._order]
+
+    def cloud(self):
+        """The points with all fields as a pyvista.PolyData."""
+        import pyvista
+
+        cloud = pyvista.PolyData(self.position)
+        for name in self.names:
+            cloud.point_data[name] = self[name]
+        return cloud
+
+    def domains(self):
+        """The points' domains with all fields as a pyvista.UnstructuredGrid; None with the basis mpm."""
+        import pyvista
+
+        corners = self.corners
+        if corners is None:
+            return None
+        count, each, _ = corners.shape
+        kind = {4: pyvista.CellType.QUAD, 8: pyvista.CellType.HEXAHEDRON}[each]
+        numbers = np.arange(count * each).reshape(count, each)
+        cells = np.hstack([np.full((count, 1), each), numbers])
+        grid = pyvista.UnstructuredGrid(cells, np.full(count, kind), corners.reshape(-1, 3))
+        for name in self.names:
+            grid.cell_data[name] = self[name]
+        return grid
 
     def unit(self, selector):
         return self.units.get(selector.strip("|").split(".")[0], "")
@@ -158,9 +195,9 @@ class Run:
         order = np.argsort(distance[near], kind="stable")
         return distance[near][order], values[near][order]
 
-    def plot(self, selector, step=-1, save=None, axes=None):
-        """Points coloured by a field, from the front (x across, the last axis up). `save`: a file
-        (png, svg, pdf). Returns the axes."""
+    def plot(self, selector, step=-1, save=None, axes=None, domains=False):
+        """Points coloured by a field, from the front (x across, the last axis up); with `domains` in
+        the plane the domains of the points. `save`: a file (png, svg, pdf). Returns the axes."""
         import matplotlib
 
         if save and axes is None:
@@ -168,19 +205,32 @@ class Run:
         import matplotlib.pyplot as plt
 
         frame = self.points(step)
-        x, y = frame.position[:, 0], frame.position[:, 1]
+        x, y, upward = frame.position[:, 0], frame.position[:, 1], "y"
         if np.any(frame.position[:, 2] != 0.0):
-            y = frame.position[:, 2]
+            y, upward = frame.position[:, 2], "z"
         if axes is None:
             _, axes = plt.subplots(layout="constrained")
+        corners = frame.corners if domains else None
+        if domains and (corners is None or corners.shape[1] != 4):
+            raise ValueError("domains are drawn in the plane, and mpm has none: frame.domains() is for pyvista")
         size = max((spacing(frame.position) / max(np.ptp(x), np.ptp(y), 1e-300) * 400) ** 2, 1.0)
-        drawn = axes.scatter(x, y, c=frame.component(selector), s=size, marker="s", linewidths=0)
+        if corners is None:
+            values = frame.component(selector)
+            drawn = axes.scatter(x, y, c=values, s=size, marker="s", linewidths=0)
+        else:
+            from matplotlib.collections import PolyCollection
+
+            drawn = PolyCollection(corners[:, :, :2], edgecolors="#0006", linewidths=0.4)
+            drawn.set_array(frame.component(selector))
+            axes.add_collection(drawn)
+            axes.autoscale_view()
         axes.set_aspect("equal")
         axes.set_xlabel("x [m]")
+        axes.set_ylabel(f"{upward} [m]")
         axes.set_title(f"step {frame.step}")
         axes.figure.colorbar(drawn, ax=axes, label=f"{selector} [{frame.unit(selector)}]")
         if save:
-            axes.figure.savefig(save, dpi=150)
+            axes.figure.savefig(save, dpi=150, bbox_inches="tight")
             plt.close(axes.figure)
         return axes
 

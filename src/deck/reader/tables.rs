@@ -119,7 +119,12 @@ impl Table<'_> {
             unreachable!("only keys of kind named are opened as named tables")
         };
         let Some(node) = self.node(name) else { return Ok(Vec::new()) };
-        let Value::Table(entries) = &node.value else { return Err(self.mismatch(key, node)) };
+        let Value::Table(entries) = &node.value else {
+            let full = self.full(name);
+            let message = format!("expected {}, found {}", key.kind.describe(), node.describe());
+            let help = format!("write [{full}.NAME], in single brackets, with a name of your own");
+            return Err(self.problem_with_help(name, message, help));
+        };
         let all: Vec<Got<T>> = entries
             .iter()
             .map(|entry| {

@@ -5,6 +5,8 @@ use crate::deck::choices::Choice;
 use crate::deck::expression::{Expression, Variable};
 use crate::deck::problems::{Got, Reported, nearest};
 use crate::deck::schema::{Key, Kind, Range, quoted};
+use crate::deck::slips;
+use crate::deck::synonyms;
 use crate::deck::tree::{Node, Origin, Value};
 
 impl Table<'_> {
@@ -24,9 +26,11 @@ impl Table<'_> {
         known: &[&str],
         origin: &Origin,
     ) -> Reported {
-        let help = nearest(word, known.iter().copied())
-            .map(|near| format!("did you mean \"{near}\"?"))
-            .unwrap_or_default();
+        let near = || nearest(word, known.iter().copied());
+        let help = match synonyms::word(word, known.iter().copied()) {
+            Some(meant) => format!("here it is called \"{meant}\""),
+            None => near().map(|near| format!("did you mean \"{near}\"?")).unwrap_or_default(),
+        };
         let expected = match known {
             [] => "nothing to choose from".to_string(),
             [one] => format!("expected \"{one}\""),
@@ -92,7 +96,8 @@ impl Table<'_> {
         }
         let Value::String(text) = &node.value else { return Err(self.mismatch(key, node)) };
         let report = |message: String| {
-            self.problems.report(&node.origin, &self.full(key.name), message, String::new())
+            let help = slips::cure_of_formula(text);
+            self.problems.report(&node.origin, &self.full(key.name), message, help)
         };
         let expression = Expression::parse(text).map_err(report)?;
         let foreign = Variable::ALL

@@ -3,6 +3,7 @@
 use crate::deck::model::{BodySource, Deck, InitialStress, Material, Seeding};
 use crate::deck::schema::AXES;
 use crate::deck::shape::{Form, Shape};
+use crate::deck::solid::Solid;
 
 use super::problem::presence;
 use super::toml_text::{array, counts, expression, expressions, inline, number, quote, vector};
@@ -106,6 +107,11 @@ fn initial_stress(stress: &InitialStress) -> String {
     }
 }
 
+/// What the lengths of an STL file were multiplied by.
+pub(super) fn solid_scale(solid: &Solid) -> Option<(&'static str, String)> {
+    (solid.scale != 1.0).then(|| ("scale", number(solid.scale)))
+}
+
 fn shape(region: &Shape) -> String {
     let set = |parts: &[Shape]| array(parts.iter().map(shape));
     let mut pairs = vec![match &region.form {
@@ -135,6 +141,9 @@ fn shape(region: &Shape) -> String {
         Form::Intersection(parts) => ("intersection", set(parts)),
         Form::Difference(parts) => ("difference", set(parts)),
     }];
+    if let Form::Solid(solid) = &region.form {
+        pairs.extend(solid_scale(solid));
+    }
     if let Some(turn) = &region.placement.rotate {
         let mut rotate = vec![("degrees", number(turn.degrees)), ("about", vector(&turn.about))];
         if turn.about.len() == 3 {

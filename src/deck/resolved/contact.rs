@@ -2,6 +2,7 @@
 
 use crate::deck::model::{AnalysisType, Deck, Friction, Partner, RigidMotion, RigidShape};
 
+use super::bodies::solid_scale;
 use super::problem::presence;
 use super::toml_text::{array, expression, expressions, inline, number, quote, vector};
 use super::writer::Writer;
@@ -10,7 +11,7 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
     for rigid in &deck.rigids {
         w.table("[[rigid]]");
         w.line("rigid", "name", quote(&rigid.name));
-        w.line("rigid", "shape", inline(&[rigid_shape(&rigid.shape)]));
+        w.line("rigid", "shape", inline(&rigid_shape(&rigid.shape)));
         let RigidMotion { displacement, velocity, rotation } = &rigid.motion;
         let mut pairs = Vec::new();
         for (key, all) in [("displacement", displacement), ("velocity", velocity)] {
@@ -61,8 +62,8 @@ pub(super) fn contact(w: &mut Writer<'_>, deck: &Deck) {
     }
 }
 
-fn rigid_shape(shape: &RigidShape) -> (&'static str, String) {
-    match shape {
+fn rigid_shape(shape: &RigidShape) -> Vec<(&'static str, String)> {
+    let form = match shape {
         RigidShape::HalfSpace { point, normal } => {
             ("half_space", inline(&[("point", vector(point)), ("normal", vector(normal))]))
         }
@@ -88,5 +89,10 @@ fn rigid_shape(shape: &RigidShape) -> (&'static str, String) {
                 ("shaft", number(*shaft)),
             ]),
         ),
+    };
+    let mut pairs = vec![form];
+    if let RigidShape::Solid(solid) = shape {
+        pairs.extend(solid_scale(solid));
     }
+    pairs
 }

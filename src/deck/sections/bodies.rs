@@ -11,6 +11,7 @@ use crate::deck::model::{
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema::AXES;
+use crate::deck::slips;
 use crate::deck::stage::Presence;
 use crate::deck::tree::Value;
 
@@ -121,7 +122,7 @@ fn source(body: &Table<'_>, shape: &Table<'_>, earlier: &EarlierSections<'_>) ->
         shape.refuse(&shapes::FORMS, "points come from a file; leave one of them out")?;
         shape.refuse(&["cells"], "points come from a file; leave one of them out")?;
         shape.refuse(&placed, "points of a file stay where they are")?;
-        body.refuse(&seeds, "points come from a file")?;
+        body.refuse(&seeds, "points come from a file: leave this key out")?;
         let path = shape.text("points").map(|name| earlier.directory.join(name));
         let of_body = shape.count_if("of_body");
         let names = shape.table_if("names", |names| point_names(&names));
@@ -158,21 +159,25 @@ fn source(body: &Table<'_>, shape: &Table<'_>, earlier: &EarlierSections<'_>) ->
     if let (Some((low, high)), Some((min, max))) = (form.bounds(), grid_bounds(earlier.grid)) {
         for axis in 0..earlier.dimension {
             if high[axis] < min[axis] || low[axis] > max[axis] {
-                return Err(shape.problem(
-                    "",
-                    format!(
-                        "the body lies outside the grid: {} from {} to {} m, the grid from {} to {} m",
-                        AXES[axis],
-                        figure(low[axis]),
-                        figure(high[axis]),
-                        figure(min[axis]),
-                        figure(max[axis])
-                    ),
-                ));
+                let message = format!(
+                    "the body lies outside the grid: {} from {} to {} m, the grid from {} to {} m",
+                    AXES[axis],
+                    figure(low[axis]),
+                    figure(high[axis]),
+                    figure(min[axis]),
+                    figure(max[axis])
+                );
+                let help = slips::of_length(longest(&low, &high), longest(&min, &max));
+                return Err(shape.problem_with_help("", message, help));
             }
         }
     }
     Ok(BodySource::Shape { shape: form, seeding: seeding? })
+}
+
+/// The longest side of a box.
+fn longest(low: &[f64], high: &[f64]) -> f64 {
+    low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f64::max)
 }
 
 /// Lower and upper corner, where the deck tells them.

@@ -85,6 +85,9 @@ pub fn rigids(
 
 fn shape(table: &Table<'_>, directory: &Path, dimension: usize) -> Got<RigidShape> {
     let form = table.one_of(&FORMS)?;
+    if form != "stl" {
+        table.refuse(&["scale"], "only beside stl")?;
+    }
     match form {
         "stl" if dimension != 3 => Err(table.problem("stl", "bounds a body in 3D; the grid is 2D")),
         "stl" => shapes::of_stl(table, directory).map(RigidShape::Solid),

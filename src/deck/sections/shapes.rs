@@ -41,6 +41,9 @@ pub fn shape(table: &Table<'_>, directory: &Path, dimension: usize, depth: usize
         table.refuse(&["points", "cells", "of_body", "names"], "only directly in a body")?;
     }
     let name = table.one_of(&FORMS)?;
+    if name != "stl" {
+        table.refuse(&["scale"], "only beside stl")?;
+    }
     let form = form(table, name, directory, dimension, depth);
     let placement = placement(table, dimension);
     Ok(Shape { form: form?, placement: placement? })
@@ -105,10 +108,10 @@ fn form(
 
 /// The solid of the file that key `stl` names.
 pub fn of_stl(table: &Table<'_>, directory: &Path) -> Got<Arc<Solid>> {
-    let path = directory.join(table.text("stl")?);
+    let (path, scale) = (directory.join(table.text("stl")?), table.number_if("scale")?);
     let made = content(&path, input_file::DATA)
         .and_then(|bytes| stl::read(&bytes))
-        .and_then(|triangles| Solid::new(&path, None, triangles));
+        .and_then(|triangles| Solid::scaled(&path, triangles, scale.unwrap_or(1.0)));
     solid(table, "stl", &path, made)
 }
 

@@ -35,6 +35,8 @@ pub type Place = [f64; 3];
 pub struct Solid {
     /// The file that it came from.
     pub path: PathBuf,
+    /// What the file's lengths were multiplied by.
+    pub scale: f64,
     /// What is below a terrain reaches down to this height, m; `None` for an STL file.
     pub bottom: Option<f64>,
     pub triangles: Vec<[Place; 3]>,
@@ -59,7 +61,14 @@ impl Solid {
         closed::require(&triangles)?;
         let boxes = Boxes::new(&triangles);
         meeting::require_none(&triangles, &boxes)?;
-        Ok(Solid { path: path.to_path_buf(), bottom, triangles, boxes })
+        Ok(Solid { path: path.to_path_buf(), scale: 1.0, bottom, triangles, boxes })
+    }
+
+    /// Of a file whose lengths are `1 / scale` times those of the deck. Errors as of [`Solid::new`].
+    pub fn scaled(path: &Path, triangles: Vec<[Place; 3]>, scale: f64) -> Result<Self, String> {
+        let larger = |corners: [Place; 3]| corners.map(|place| place.map(|x| x * scale));
+        let triangles = triangles.into_iter().map(larger).collect();
+        Ok(Solid { scale, ..Solid::new(path, None, triangles)? })
     }
 
     /// The box between two corners.
@@ -72,7 +81,7 @@ impl Solid {
     pub fn renamed(&self, path: PathBuf) -> Self {
         let triangles = self.triangles.clone();
         let boxes = Boxes::new(&triangles);
-        Solid { path, bottom: self.bottom, triangles, boxes }
+        Solid { path, scale: self.scale, bottom: self.bottom, triangles, boxes }
     }
 
     /// Lowest and highest coordinates, m.

@@ -96,6 +96,34 @@ fn grows(values: &[f64]) -> bool {
     values.iter().any(|v| *v != 0.0) && values.windows(2).all(|pair| pair[0] <= pair[1])
 }
 
+/// The corner for the legend: the one with the fewest places of lines in its third of the picture.
+fn free_corner<'a>(
+    places: impl Iterator<Item = &'a (f64, f64)>,
+    x: (f64, f64),
+    y: (f64, f64),
+) -> SeriesLabelPosition {
+    // Upper left, upper right, lower right, lower left.
+    let mut counts = [0; 4];
+    for place in places {
+        let across = (place.0 - x.0) / (x.1 - x.0);
+        let up = (place.1 - y.0) / (y.1 - y.0);
+        let (left, right) = (across < 0.33, across > 0.67);
+        let (low, high) = (up < 0.33, up > 0.67);
+        for (count, is_in) in
+            counts.iter_mut().zip([left && high, right && high, right && low, left && low])
+        {
+            *count += usize::from(is_in);
+        }
+    }
+    let least = (0..4).min_by_key(|&corner| counts[corner]).unwrap_or(0);
+    match least {
+        0 => SeriesLabelPosition::UpperLeft,
+        1 => SeriesLabelPosition::UpperRight,
+        2 => SeriesLabelPosition::LowerRight,
+        _ => SeriesLabelPosition::LowerLeft,
+    }
+}
+
 /// Ends with a little margin; a width where all are equal.
 fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
@@ -128,6 +156,7 @@ impl Drawing for Curves {
             .margin(14)
             .build_cartesian_2d(x.0..x.1, y.0..y.1)
             .map_err(said)?;
+        let corner = free_corner(coordinates(), x, y);
         let title = match &self.lines[..] {
             [(one, _)] => one.clone(),
             _ => String::new(),
@@ -160,7 +189,7 @@ impl Drawing for Curves {
         if self.lines.len() > 1 {
             chart
                 .configure_series_labels()
-                .position(SeriesLabelPosition::UpperLeft)
+                .position(corner)
                 .background_style(WHITE.mix(0.85))
                 .border_style(BLACK.mix(0.2))
                 .label_font(("sans-serif", LETTERS - 4))
@@ -174,6 +203,19 @@ impl Drawing for Curves {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_legend_stands_where_no_line_is() {
+        let ends = (0.0, 1.0);
+        let of = |places: &[(f64, f64)]| free_corner(places.iter(), ends, ends);
+        assert!(matches!(of(&[]), SeriesLabelPosition::UpperLeft));
+        let left = [(0.1, 0.9), (0.1, 0.1)];
+        assert!(matches!(of(&left), SeriesLabelPosition::UpperRight));
+        let top = [(0.1, 0.9), (0.9, 0.9)];
+        assert!(matches!(of(&top), SeriesLabelPosition::LowerRight));
+        let all_but_one = [(0.1, 0.9), (0.9, 0.9), (0.9, 0.1)];
+        assert!(matches!(of(&all_but_one), SeriesLabelPosition::LowerLeft));
+    }
 
     #[test]
     fn what_grows_is_drawn_across() {

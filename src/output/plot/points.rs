@@ -1,4 +1,5 @@
-//! Points as squares of their spacing, coloured by a field; solids from the front and above.
+//! Points as squares of their spacing, or their domains, coloured by a field; solids from the front and
+//! above.
 
 use std::path::Path;
 
@@ -82,11 +83,14 @@ impl<'a> Scene<'a> {
         let side = spacing(positions);
         let all: Vec<(f64, f64, f64)> =
             positions.chunks_exact(3).map(|x| projected(picture.flat, x)).collect();
+        let drawn = picture.frame.corners.chunks_exact(3).map(|x| projected(picture.flat, x));
+        let ends: Vec<(f64, f64, f64)> =
+            if drawn.len() > 0 { drawn.collect() } else { all.clone() };
         let end = |pick: fn(&(f64, f64, f64)) -> f64, most: bool| {
-            let values = all.iter().map(pick);
+            let values = ends.iter().map(pick);
             if most { values.fold(f64::MIN, f64::max) } else { values.fold(f64::MAX, f64::min) }
         };
-        let half = 0.5 * side;
+        let half = if picture.frame.corners.is_empty() { 0.5 * side } else { 0.0 };
         let low = (end(|p| p.0, false) - half, end(|p| p.1, false) - half);
         let high = (end(|p| p.0, true) + half, end(|p| p.1, true) + half);
         let finite = picture.values.iter().map(|&v| f64::from(v)).filter(|v| v.is_finite());
@@ -155,12 +159,26 @@ impl Drawing for Scene<'_> {
         let half = 0.56 * self.side.max(1.5 / scale);
         let (low, high) = self.colours;
         let share = |value: f64| if high > low { (value - low) / (high - low) } else { 0.0 };
-        let squares = order.iter().map(|&p| {
-            let (x, y, _) = self.places[p];
-            let paint = colour(share(f64::from(self.picture.values[p]))).filled();
-            Rectangle::new([(x - half, y - half), (x + half, y + half)], paint)
-        });
-        chart.draw_series(squares).map_err(said)?;
+        let paint = |p: usize| colour(share(f64::from(self.picture.values[p])));
+        if self.picture.frame.corners.is_empty() {
+            let squares = order.iter().map(|&p| {
+                let (x, y, _) = self.places[p];
+                Rectangle::new([(x - half, y - half), (x + half, y + half)], paint(p).filled())
+            });
+            chart.draw_series(squares).map_err(said)?;
+        } else {
+            // An outline shows gaps and overlaps, where it does not cover the colour.
+            let outline = BLACK.mix(if scale * self.side > 6.0 { 0.45 } else { 0.0 });
+            for &p in &order {
+                for face in self.faces(p) {
+                    let edge = face.iter().chain(&face[..1]).copied().collect::<Vec<_>>();
+                    chart.draw_series([Polygon::new(face, paint(p).filled())]).map_err(said)?;
+                    chart
+                        .draw_series([PathElement::new(edge, outline.stroke_width(1))])
+                        .map_err(said)?;
+                }
+            }
+        }
         let (x, y) = (chart.x_range(), chart.y_range());
         let (low, high) = ((x.start, y.start), (x.end, y.end));
         let edges = self.picture.frame.edges.iter().filter_map(|ends| {
@@ -178,7 +196,30 @@ impl Drawing for Scene<'_> {
     }
 }
 
+/// Faces of a hexahedron, counter-clockwise as seen from outside.
+const FACES: [[usize; 4]; 6] =
+    [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
 impl Scene<'_> {
+    /// The domain of a point: in the plane its corners, in space the faces that face the reader.
+    fn faces(&self, p: usize) -> Vec<Vec<Place>> {
+        let (frame, flat) = (self.picture.frame, self.picture.flat);
+        let each = frame.corners.len() / frame.positions.len().max(1);
+        let rows = frame.corners[3 * each * p..3 * each * (p + 1)].chunks_exact(3);
+        let corners: Vec<Place> = rows
+            .map(|x| {
+                let (x, y, _) = projected(flat, x);
+                (x, y)
+            })
+            .collect();
+        if each != 8 {
+            return vec![corners];
+        }
+        let face =
+            |numbers: [usize; 4]| -> Vec<Place> { numbers.iter().map(|&k| corners[k]).collect() };
+        FACES.map(face).into_iter().filter(|face| area(face) > 0.0).collect()
+    }
+
     fn legend<B: DrawingBackend>(
         &self,
         area: &DrawingArea<B, Shift>,
@@ -225,6 +266,12 @@ fn projected(flat: bool, x: &[f32]) -> (f64, f64, f64) {
 }
 
 type Place = (f64, f64);
+
+/// Of a polygon; positive if its corners run counter-clockwise.
+fn area(corners: &[Place]) -> f64 {
+    let next = corners.iter().cycle().skip(1);
+    0.5 * corners.iter().zip(next).map(|(a, b)| a.0 * b.1 - b.0 * a.1).sum::<f64>()
+}
 
 /// The part of a line inside a rectangle (Liang and Barsky 1984).
 fn clipped(a: Place, b: Place, low: Place, high: Place) -> Option<(Place, Place)> {

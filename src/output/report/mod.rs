@@ -4,7 +4,9 @@
 //! |---|---|
 //! | `gather.rs` | the data, from the files of the results directory |
 //! | `mod.rs` | the page around them |
-//! | `assets/` | the page's own parts; uPlot (MIT) draws the curves |
+//! | `assets/` | the page's own parts; uPlot (MIT) draws the curves, OGL (Unlicense) the points by WebGL |
+//!
+//! `jobs/report_assets.sh` makes the two libraries from npm.
 //!
 //! Everything comes from what the run has written: nothing is gathered from other ranks, and a report
 //! of a run that goes on, or was killed, is made by the command `mpm-par report`.
@@ -24,6 +26,8 @@ const BODY: &str = include_str!("assets/body.html");
 const STYLE: &str = include_str!("assets/style.css");
 const POINTS: &str = include_str!("assets/points.js");
 const PAGE: &str = include_str!("assets/page.js");
+const OGL: &str = include_str!("assets/ogl.iife.min.js");
+const OGL_LICENCE: &str = include_str!("assets/ogl.LICENSE");
 const PLOT: &str = include_str!("assets/uPlot.iife.min.js");
 const PLOT_STYLE: &str = include_str!("assets/uPlot.min.css");
 const PLOT_LICENCE: &str = include_str!("assets/uPlot.LICENSE");
@@ -64,6 +68,7 @@ fn page(data: &serde_json::Value) -> String {
          <title>{title}</title>\n<style>\n{PLOT_STYLE}\n{STYLE}</style>\n</head>\n<body>\n{BODY}\
          <script type=\"application/json\" id=\"data\">{json}</script>\n\
          <!-- uPlot draws the curves.\n{PLOT_LICENCE}-->\n<script>{PLOT}</script>\n\
+         <!-- OGL draws the points.\n{OGL_LICENCE}-->\n<script>{OGL}</script>\n\
          <script>\n{POINTS}</script>\n<script>\n{PAGE}</script>\n</body>\n</html>\n"
     )
 }

@@ -46,6 +46,8 @@ pub struct Frame {
     pub positions: Vec<f32>,
     /// Of each column.
     pub values: Vec<Vec<f32>>,
+    /// x, y, z of the 4 or 8 corners of each point's domain; empty unless asked for.
+    pub corners: Vec<f32>,
     /// Edges of the surfaces of rigid bodies: x, y, z of both ends.
     pub edges: Vec<[f32; 6]>,
 }
@@ -107,11 +109,11 @@ pub fn read(directory: &Path) -> Result<Frames> {
 /// Points of one frame at most: a picture has no room for more.
 const MOST_POINTS: usize = 2_000_000;
 
-/// A frame and its columns. `step`: `None` for the last.
+/// A frame and its columns. `step`: `None` for the last. `domains`: with the corners of the points' domains.
 ///
 /// # Errors
-/// `Input` if there is no frame, or none of that step.
-pub fn read_one(directory: &Path, step: Option<usize>) -> Result<Frames> {
+/// `Input` if there is no frame, or none of that step, or no domains in it.
+pub fn read_one(directory: &Path, step: Option<usize>, domains: bool) -> Result<Frames> {
     let all = written(directory)?;
     let Some((last, _)) = all.last() else {
         return Err(Error::Input(format!("{} holds no points-*.h5", directory.display())));
@@ -132,6 +134,22 @@ pub fn read_one(directory: &Path, step: Option<usize>) -> Result<Frames> {
         Ok(Frames { columns, frames: vec![frame], points, stride, written: all.len(), flat })
     };
     let mut read = frames().map_err(|reason| unreadable(path, &reason))?;
+    if domains {
+        if !file.link_exists("domain_corners") {
+            return Err(Error::Input(format!(
+                "{} has no domains: method.basis = \"mpm\" has points only",
+                path.display()
+            )));
+        }
+        if read.stride > 1 {
+            return Err(Error::Input(format!(
+                "domains are drawn of {MOST_POINTS} points at most, and the frame has {}",
+                read.points
+            )));
+        }
+        let corners = table(&file, "domain_corners", 1).map_err(|r| unreadable(path, &r))?.0;
+        read.frames[0].corners = corners.iter().map(|&x| x as f32).collect();
+    }
     if let Some(frame) = read.frames.pop() {
         read.frames.push(with_edges(directory, frame)?);
     }
@@ -325,7 +343,7 @@ fn sample(
         };
         values.push(all.chunks_exact(*width).map(of_row).collect());
     }
-    Ok(Frame { step, time, positions, values, edges: Vec::new() })
+    Ok(Frame { step, time, positions, values, corners: Vec::new(), edges: Vec::new() })
 }
 
 #[cfg(test)]

@@ -43,14 +43,20 @@ pub fn read<const D: usize>(file: &PointsFile) -> Got<Cloud<D>> {
     let mut numbers = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|error| match error.position() {
-            Some(position) => wrong(position.line(), error.to_string()),
+            Some(position) => wrong(position.line(), of_record(&error)),
             None => unreadable(error),
         })?;
         let line = lines.of_record(&record);
         let number = |at: usize| -> Got<f64> {
             let text = record.get(at).unwrap_or("");
             text.parse::<f64>().ok().filter(|value| value.is_finite()).ok_or_else(|| {
-                wrong(line, format!("\"{text}\" in column \"{}\" is not a number", &headers[at]))
+                let pointed = text.replacen(',', ".", 1);
+                let hint = match pointed != text && pointed.parse::<f64>().is_ok() {
+                    true => ": decimals have a point",
+                    false => "",
+                };
+                let column = &headers[at];
+                wrong(line, format!("\"{text}\" in column \"{column}\" is not a number{hint}"))
             })
         };
         let mut x = [0.0; D];
@@ -76,6 +82,17 @@ pub fn read<const D: usize>(file: &PointsFile) -> Got<Cloud<D>> {
     }
     rows.rows = Rows::Lines(numbers);
     Ok(rows)
+}
+
+/// What is wrong with a line.
+fn of_record(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::UnequalLengths { expected_len, len, .. } => format!(
+            "{len} values, but the header has {expected_len} columns; commas stand between values, and \
+             decimals have a point (0.5, not 0,5)"
+        ),
+        _ => error.to_string(),
+    }
 }
 
 /// The lines of a file by their bytes: the reader counts those of comments and blanks before a record as
@@ -147,7 +164,15 @@ impl Columns {
         };
         // A file that was named by mistake may hold what must not appear on a screen or in a log.
         if !headers.iter().any(|name| known().any(|column| column == name)) {
-            return Err(format!("this is not a file of points: {expected}"));
+            let first = headers.get(0).unwrap_or("");
+            let apart = [(';', "semicolons"), ('\t', "tabs")];
+            let hint = match apart.into_iter().find(|(mark, _)| first.contains(*mark)) {
+                Some((_, marks)) => format!(
+                    "; it has {marks} between the columns: write commas there, and decimals with a point"
+                ),
+                None => String::new(),
+            };
+            return Err(format!("this is not a file of points: {expected}{hint}"));
         }
         for (at, name) in headers.iter().enumerate() {
             if !names.any() && !known().any(|column| column == name) {

@@ -32,7 +32,10 @@
     const warnings = summary.warnings || [];
     $("warnings-part").hidden = !warnings.length;
     warnings.forEach((text) => $("warnings").append(make("li", text)));
-    const facts = [["points", summary.points], ["populated cells", summary.cells_populated],
+    const lattice = data.grid;
+    const facts = [["points", summary.points],
+      ...(lattice ? [["grid", `${lattice.size.map(figure).join(" by ")} m from (${lattice.origin.map(figure).join(", ")}), h = ${[...new Set(lattice.h.map(figure))].join(", ")} m`]] : []),
+      ["populated cells", summary.cells_populated],
       ["ranks", `${summary.ranks}, imbalance ${figure(summary.imbalance)}`]];
     if (summary.newton_iterations.total)
       facts.push(["Newton iterations", `${summary.newton_iterations.total}, at most ${summary.newton_iterations.max} in a step`]);
@@ -146,6 +149,7 @@
     group("Momentum", history, (n) => n.startsWith("momentum_"));
     group("Condition numbers", history, (n) => n.startsWith("kappa_"), { log: true });
     group("Time step", history, (n) => n === "dt");
+    group("Balance: load of the busiest rank over the mean", history, (n) => n === "imbalance");
   }
   if (probes) {
     // Columns of one unit share a picture.
