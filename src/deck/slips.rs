@@ -21,7 +21,7 @@ pub fn cure(text: &str, span: Option<&Range<usize>>) -> String {
     }
     let Some((key, value)) = line.split_once('=') else { return String::new() };
     let value = value.split('#').next().unwrap_or("").trim();
-    if value.starts_with('"') && value.contains('\\') {
+    if value.find('"').is_some_and(|quote| value[quote..].contains('\\')) {
         return "in double quotes a backslash begins an escape: write the name in 'single quotes', or \
                 with /"
             .into();
@@ -95,6 +95,7 @@ mod tests {
         assert_eq!(of("density = 1835,0   # kg/m3"), "decimals have a point: density = 1835.0");
         assert_eq!(of("young = 10 MPa"), UNITS);
         assert!(of("points = \"C:\\data\\p.csv\"").contains("'single quotes'"));
+        assert!(of("shape = { points = \"C:\\data\\p.csv\" }").contains("'single quotes'"));
         assert!(of("title = \u{201c}sand\u{201d}").contains("straight"));
         assert!(of("[load]").contains("[[load]]"));
         assert!(of("[material.clay]").contains("[material.NAME]"));
