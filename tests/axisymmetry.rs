@@ -517,24 +517,51 @@ every = 100
 fields = ["stress", "J"]
 "#;
 
-/// A sample between a base and a platen: unconfined it does what one point does in an element test, and
+/// A sample between a base and a platen: unconfined it does what one point does in an element test, of every model; and
 /// under a pressure all round it fails at sigma_1 = N sigma_3 + 2 (c/J) N^(1/2), N = 3.
 #[test]
 fn a_triaxial_sample_of_one_cell_is_an_element_test() {
-    let test = Run::of("triaxial").set("element_test.confining=0.0").results();
-    let last = test.text("element.csv");
-    let last = last.lines().last().expect("rows").split(',').map(|word| word.parse::<f64>());
-    let alone: Vec<f64> = last.map(|number| number.expect("a number")).collect();
-    for basis in ["gimp", "mpm"] {
-        let run = || Run::text(CELL).set(format!("method.basis=\"{basis}\""));
-        let sample = run().ranks(2).results().points(100);
-        let scale = alone[4].abs();
-        for (component, of_test) in [(3, 4), (0, 5), (5, 6)] {
-            for stress in sample.component("stress", component) {
-                let off = (stress - alone[of_test]).abs() / scale;
-                assert!(off < 1e-8, "{basis}: {stress} for {} ({off:e})", alone[of_test]);
+    let soil = "friction=30.0, dilation=10.0, cohesion=10e3";
+    let models = [
+        format!("model=\"mohr-coulomb\", {soil}"),
+        format!("model=\"drucker-prager\", fit=\"outer\", {soil}"),
+        format!("model=\"drucker-prager\", hardening=1e6, {soil}"),
+        format!(
+            "model=\"mohr-coulomb\", {soil}, softening={{ strain=0.2, friction=20.0, cohesion=5e3, \
+             dilation=0.0, length=1.0 }}"
+        ),
+        "model=\"tresca\", shear_strength=10e3".into(),
+        "model=\"von-mises\", yield_stress=20e3, hardening=1e6".into(),
+        "model=\"neo-hookean\"".into(),
+    ];
+    let mut strengths = Vec::new();
+    for model in &models {
+        let model = format!("material.sand={{ young=100e6, poisson=0.3, {model} }}");
+        let test = Run::of("triaxial").set("element_test.confining=0.0").set(&model).results();
+        let last = test.text("element.csv");
+        let last = last.lines().last().expect("rows").split(',').map(|word| word.parse::<f64>());
+        let alone: Vec<f64> = last.map(|number| number.expect("a number")).collect();
+        for basis in ["gimp", "mpm"] {
+            let run = Run::text(CELL).set(format!("method.basis=\"{basis}\"")).set(&model);
+            let sample = run.ranks(2).results().points(100);
+            let scale = alone[4].abs();
+            for (component, of_test) in [(3, 4), (0, 5), (5, 6)] {
+                for stress in sample.component("stress", component) {
+                    let off = (stress - alone[of_test]).abs() / scale;
+                    assert!(
+                        off < 1e-8,
+                        "{model}, {basis}: {stress} for {} ({off:e})",
+                        alone[of_test]
+                    );
+                }
             }
         }
+        strengths.push(alone[4]);
+    }
+    // The outer cone is the pyramid where the two smaller pressures are equal.
+    assert!((strengths[1] / strengths[0] - 1.0).abs() < 1e-9, "{strengths:?}");
+    for basis in ["gimp", "mpm"] {
+        let run = || Run::text(CELL).set(format!("method.basis=\"{basis}\""));
         // The platen's reaction is what the pressure leaves of sigma_1.
         let load = "load=[{pressure={value=\"100e3*min(1,20*s)\"}}]";
         let confined = run().set(load).results();

@@ -17,7 +17,8 @@ const FIT: Parameter = Parameter::choice(
     &["plane-strain", "outer", "inner"],
     "\"plane-strain\"",
     "Which cone stands for the Mohr-Coulomb pyramid: plane strain at collapse, through its outer \
-     (triaxial compression) or inner (extension) edges.",
+     (triaxial compression) or inner (extension) edges. The outer cone is stronger than the pyramid in \
+     every other state: its 31 degrees act as 41 to 44 where a round column of sand spreads.",
 );
 
 /// Drucker-Prager plasticity with apex on Hencky elasticity.
