@@ -8,12 +8,13 @@
 //! its derivatives at a point.
 //!
 //! `max`, `min` and `abs` in the formula are averaged over the width of a point's domain
-//! ([`Jet::reach`](crate::deck::expression::Jet)), exactly so where the arguments vary along one
+//! ([`jet::Averaged`]), exactly so where the arguments vary along one
 //! axis. The force then changes continuously while points cross a water surface.
 
 use super::{Load, Moment};
 use crate::deck::Scope;
-use crate::deck::expression::{Expression, Smooth, jet::Jet};
+use crate::deck::expression::jet::{self, Dual};
+use crate::deck::expression::{Expression, Jet, Smooth};
 use crate::error::{Error, Result};
 
 /// Cells over which a pressure fades outside its zone where the deck says nothing.
@@ -97,33 +98,29 @@ impl Pressure {
         scope.current[..D].copy_from_slice(x);
         let mut wide = [0.0; 3];
         wide[..D].copy_from_slice(reach);
-        let mut jet = self.smooth.jet_of_current(&scope, wide);
+        let mut value = self.smooth.of_current(&scope, wide);
         if let Some(zone) = &self.zone {
             for axis in 0..D {
-                let place = Jet::coordinate(x[axis], axis);
-                jet = jet * fading(place, zone.min[axis], zone.max[axis], self.fade);
+                let place = jet::coordinate(x[axis], axis);
+                value *= fading(place, zone.min[axis], zone.max[axis], self.fade);
             }
         }
-        sum.add(&(jet * Jet::constant(at.factor_of(&self.value) * body)));
+        sum.add(&(value * (at.factor_of(&self.value) * body)).into());
     }
 }
 
 /// 1 from `min` to `max`, and 0 beyond `fade` outside, with two continuous derivatives between:
 /// 1 - d^3 (10 - 15 d + 6 d^2) at d fades.
-fn fading(x: Jet, min: f64, max: f64, fade: f64) -> Jet {
-    let (outside, slope) = match x.value {
-        v if v < min => ((min - v) / fade, -1.0 / fade),
-        v if v > max => ((v - max) / fade, 1.0 / fade),
-        _ => return Jet::constant(1.0),
+fn fading(x: Dual, min: f64, max: f64, fade: f64) -> Dual {
+    let d = match x.re {
+        v if v < min => -(x - min) / fade,
+        v if v > max => (x - max) / fade,
+        _ => return Dual::from_re(1.0),
     };
-    if outside >= 1.0 {
-        return Jet::constant(0.0);
+    if d.re >= 1.0 {
+        return Dual::from_re(0.0);
     }
-    let d = outside;
-    let value = 1.0 - d * d * d * (10.0 - 15.0 * d + 6.0 * d * d);
-    let first = -30.0 * d * d * (1.0 - d) * (1.0 - d);
-    let second = -60.0 * d * (1.0 - d) * (1.0 - 2.0 * d);
-    x.apply([value, first * slope, second * slope * slope])
+    -(d * d * d * ((d * 6.0 - 15.0) * d + 10.0)) + 1.0
 }
 
 impl<const D: usize> Load<D> for Pressure {

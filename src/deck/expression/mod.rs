@@ -6,8 +6,8 @@
 //! | `grammar.rs` | the deck's grammar |
 //! | `operators.rs` | operators and functions on plain numbers |
 //! | `program.rs` | a formula as operations on a stack, for any kind of number |
-//! | `jet.rs` | [`Jet`]: numbers that carry their first and second derivatives |
-//! | `smooth.rs` | [`Smooth`]: a formula evaluated on jets |
+//! | `jet.rs` | numbers that carry their first and second derivatives, and [`Jet`], what is read off them |
+//! | `smooth.rs` | [`Smooth`]: a formula evaluated on these |
 
 mod grammar;
 pub(crate) mod jet;
@@ -164,6 +164,13 @@ impl Expression {
     /// True if it contains `s` or `t`.
     pub fn depends_on_time(&self) -> bool {
         self.depends_on(Variable::LoadFactor) || self.depends_on(Variable::Time)
+    }
+
+    /// True if it contains a coordinate.
+    pub fn depends_on_place(&self) -> bool {
+        use Variable::{LoadFactor, Time};
+        let place = |variable: &Variable| !matches!(variable, LoadFactor | Time);
+        Variable::ALL.iter().filter(|variable| place(variable)).any(|&v| self.depends_on(v))
     }
 
     /// The value; not a number where the formula has none (for example `ln(-1)`).

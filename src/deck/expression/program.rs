@@ -21,44 +21,49 @@ pub enum Operation {
 }
 
 /// Numbers that formulas are evaluated on.
-pub trait Arithmetic: Copy {
-    fn number(value: f64) -> Self;
-    fn negated(self) -> Self;
+pub trait Algebra {
+    type Number: Copy;
+    fn number(&self, value: f64) -> Self::Number;
+    fn negated(&self, a: Self::Number) -> Self::Number;
     /// 1 for a value that does not hold, else 0.
-    fn inverted(self) -> Self;
+    fn inverted(&self, a: Self::Number) -> Self::Number;
     /// Whether a condition of this value is met.
-    fn holds(self) -> bool;
+    fn holds(&self, a: Self::Number) -> bool;
     /// The function at that place of [`FUNCTIONS`].
-    fn function(self, place: usize) -> Self;
+    fn function(&self, place: usize, a: Self::Number) -> Self::Number;
     /// The operator at that place of [`BINARY`].
-    fn binary(self, place: usize, other: Self) -> Self;
+    fn binary(&self, place: usize, a: Self::Number, b: Self::Number) -> Self::Number;
 }
 
-impl Arithmetic for f64 {
-    fn number(value: f64) -> Self {
+/// Of plain numbers.
+pub struct Plain;
+
+impl Algebra for Plain {
+    type Number = f64;
+    fn number(&self, value: f64) -> f64 {
         value
     }
 
-    fn negated(self) -> Self {
-        -self
+    fn negated(&self, a: f64) -> f64 {
+        -a
     }
 
-    fn inverted(self) -> Self {
-        truth(!holds(self))
+    fn inverted(&self, a: f64) -> f64 {
+        truth(!holds(a))
     }
 
-    fn holds(self) -> bool {
-        holds(self)
-    }
-
-    #[inline]
-    fn function(self, place: usize) -> Self {
-        FUNCTIONS[place].1(self)
+    fn holds(&self, a: f64) -> bool {
+        holds(a)
     }
 
     #[inline]
-    fn binary(self, place: usize, other: Self) -> Self {
-        BINARY[place].1(self, other)
+    fn function(&self, place: usize, a: f64) -> f64 {
+        FUNCTIONS[place].1(a)
+    }
+
+    #[inline]
+    fn binary(&self, place: usize, a: f64, b: f64) -> f64 {
+        BINARY[place].1(a, b)
     }
 }
 
@@ -99,9 +104,9 @@ impl Program {
         let open = &self.operations[self.sealed..];
         let known = match (open, operation) {
             ([.., Number(a)], Negate) => Some((1, -a)),
-            ([.., Number(a)], Not) => Some((1, a.inverted())),
-            ([.., Number(a)], Function(place)) => Some((1, a.function(place))),
-            ([.., Number(a), Number(b)], Binary(place)) => Some((2, a.binary(place, *b))),
+            ([.., Number(a)], Not) => Some((1, Plain.inverted(*a))),
+            ([.., Number(a)], Function(place)) => Some((1, Plain.function(place, *a))),
+            ([.., Number(a), Number(b)], Binary(place)) => Some((2, Plain.binary(place, *a, *b))),
             _ => None,
         };
         let operation = match known {
@@ -132,37 +137,44 @@ impl Program {
     }
 
     /// The value, with `of` giving those of the variables.
-    pub fn value<T: Arithmetic>(&self, of: impl Fn(Variable) -> T) -> T {
+    pub fn value<A: Algebra>(&self, algebra: &A, of: impl Fn(Variable) -> A::Number) -> A::Number {
         if self.deepest <= SHALLOW {
-            self.run(&mut [T::number(0.0); SHALLOW], of)
+            self.run(algebra, &mut [algebra.number(0.0); SHALLOW], of)
         } else {
-            self.run(&mut vec![T::number(0.0); self.deepest], of)
+            self.run(algebra, &mut vec![algebra.number(0.0); self.deepest], of)
         }
     }
 
-    fn run<T: Arithmetic>(&self, stack: &mut [T], of: impl Fn(Variable) -> T) -> T {
+    fn run<A: Algebra>(
+        &self,
+        algebra: &A,
+        stack: &mut [A::Number],
+        of: impl Fn(Variable) -> A::Number,
+    ) -> A::Number {
         let (mut top, mut next) = (0, 0);
         while let Some(&operation) = self.operations.get(next) {
             next += 1;
             match operation {
                 Operation::Number(value) => {
-                    stack[top] = T::number(value);
+                    stack[top] = algebra.number(value);
                     top += 1;
                 }
                 Operation::Variable(variable) => {
                     stack[top] = of(variable);
                     top += 1;
                 }
-                Operation::Negate => stack[top - 1] = stack[top - 1].negated(),
-                Operation::Not => stack[top - 1] = stack[top - 1].inverted(),
-                Operation::Function(place) => stack[top - 1] = stack[top - 1].function(place),
+                Operation::Negate => stack[top - 1] = algebra.negated(stack[top - 1]),
+                Operation::Not => stack[top - 1] = algebra.inverted(stack[top - 1]),
+                Operation::Function(place) => {
+                    stack[top - 1] = algebra.function(place, stack[top - 1])
+                }
                 Operation::Binary(place) => {
                     top -= 1;
-                    stack[top - 1] = stack[top - 1].binary(place, stack[top]);
+                    stack[top - 1] = algebra.binary(place, stack[top - 1], stack[top]);
                 }
                 Operation::Unless(other) => {
                     top -= 1;
-                    if !stack[top].holds() {
+                    if !algebra.holds(stack[top]) {
                         next = other;
                     }
                 }
@@ -174,6 +186,6 @@ impl Program {
 
     /// The value on plain numbers.
     pub fn number(&self, scope: &Scope) -> f64 {
-        self.value(|variable| scope.value(variable))
+        self.value(&Plain, |variable| scope.value(variable))
     }
 }

@@ -1,11 +1,11 @@
-//! A formula evaluated on [`Jet`]s: exact first and second derivatives at the cost of a few
+//! A formula evaluated on dual numbers: exact first and second derivatives at the cost of a few
 //! evaluations, however nested the formula is.
 
-use std::sync::{Arc, LazyLock};
+use std::sync::Arc;
 
-use super::jet::{Jet, RULES, Rule};
+use super::jet::{Averaged, Dual, Jet, RULES, coordinate};
 use super::operators::{BINARY, FUNCTIONS};
-use super::program::{Arithmetic, Operation, Program};
+use super::program::{Operation, Program};
 use super::{Scope, Variable};
 
 /// A formula of X, Y, Z (and s, t as parameters) with its derivatives.
@@ -38,22 +38,22 @@ impl Smooth {
     /// The value and its derivatives with respect to X, Y, Z; x, y, z, s and t count as constant.
     pub fn jet(&self, scope: &Scope) -> Jet {
         use Variable::{InitialX, InitialY, InitialZ};
-        self.evaluate(scope, [InitialX, InitialY, InitialZ], [0.0; 3])
+        self.evaluate(scope, [InitialX, InitialY, InitialZ], [0.0; 3]).into()
     }
 
     /// The value and its derivatives with respect to x, y, z; all others count as constant. Functions
     /// with a kink are averaged over `reach` to either side, m.
-    pub fn jet_of_current(&self, scope: &Scope, reach: [f64; 3]) -> Jet {
+    pub(crate) fn of_current(&self, scope: &Scope, reach: [f64; 3]) -> Dual {
         use Variable::{CurrentX, CurrentY, CurrentZ};
         self.evaluate(scope, [CurrentX, CurrentY, CurrentZ], reach)
     }
 
-    fn evaluate(&self, scope: &Scope, axes: [Variable; 3], reach: [f64; 3]) -> Jet {
-        self.0.value(|variable| {
+    fn evaluate(&self, scope: &Scope, axes: [Variable; 3], reach: [f64; 3]) -> Dual {
+        self.0.value(&Averaged(reach), |variable| {
             let number = scope.value(variable);
             match axes.iter().position(|axis| *axis == variable) {
-                Some(axis) => Jet::coordinate(number, axis).within(reach),
-                None => Jet::constant(number),
+                Some(axis) => coordinate(number, axis),
+                None => Dual::from_re(number),
             }
         })
     }
@@ -79,50 +79,4 @@ fn without_rule(program: &Program, kinked: &[&str]) -> Option<&'static str> {
         };
         (!smooth(name)).then_some(name)
     })
-}
-
-/// The rule of each of [`FUNCTIONS`].
-static RULE_OF: LazyLock<[Option<Rule>; FUNCTIONS.len()]> = LazyLock::new(|| {
-    FUNCTIONS.map(|(name, _)| RULES.iter().find(|(known, _)| *known == name).map(|(_, rule)| *rule))
-});
-
-impl Arithmetic for Jet {
-    fn number(value: f64) -> Self {
-        Jet::constant(value)
-    }
-
-    fn negated(self) -> Self {
-        -self
-    }
-
-    /// Formulas that branch are not smooth: [`Smooth::new`] refuses them.
-    fn inverted(self) -> Self {
-        Jet::constant(f64::NAN)
-    }
-
-    fn holds(self) -> bool {
-        self.value.holds()
-    }
-
-    fn function(self, place: usize) -> Self {
-        match RULE_OF[place] {
-            Some(rule) => self.apply(rule(self.value)),
-            None if FUNCTIONS[place].0 == "abs" => self.abs(),
-            None => Jet::constant(f64::NAN),
-        }
-    }
-
-    fn binary(self, place: usize, other: Self) -> Self {
-        match BINARY[place].0 {
-            "+" => self + other,
-            "-" => self - other,
-            "*" => self * other,
-            "/" => self / other,
-            "^" => self.power(other),
-            "atan2" => self.atan2(other),
-            "max" => self.max(other),
-            "min" => self.min(other),
-            _ => Jet::constant(f64::NAN),
-        }
-    }
 }
