@@ -276,6 +276,19 @@ fn formulas_without_a_value_at_the_start() {
  43 | body_force = [0, \"if(s > 0 && x > 3.8, sqrt(-1), 0)\"]
     |              ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^",
     );
+    // A formula of s alone, and a force whose formula has a value where its derivatives have none.
+    let point = "point = { body = \"block\", nearest = [[3.9, 0.1]], force = [0, \"1/s\"] }";
+    let outcome = replaced("gravity = [0, -20]", point).attempt();
+    assert_eq!(outcome.code, 2, "{}", outcome.stderr);
+    for words in ["load.0.point.force: y is inf N at point ", "not finite", "\n 43 | point = "] {
+        assert!(outcome.stderr.contains(words), "{}", outcome.stderr);
+    }
+    let made = "manufactured = [\"0.001*sqrt(X - 0.125)\", \"0\"]";
+    let outcome = replaced("gravity = [0, -20]", made).attempt();
+    assert_eq!(outcome.code, 2, "{}", outcome.stderr);
+    for words in ["load.0.manufactured: ", "\n 43 | manufactured = "] {
+        assert!(outcome.stderr.contains(words), "{}", outcome.stderr);
+    }
     let explicit = block().set("analysis={ type = \"explicit\", steps = 10, duration = 1e-3 }");
     refused(
         &explicit.set("body.0.velocity=[0, \"ln(0.5 - X)\"]"),

@@ -80,6 +80,11 @@ fn at_path(path: &str) -> Option<(&'static Section, &'static Key)> {
     }
 }
 
+/// Unit of the key at a dotted path; empty for a key without one.
+pub(crate) fn unit_of(path: &str) -> &'static str {
+    at_path(path).map_or("", |(_, key)| key.unit)
+}
+
 /// Keys of this name in any section.
 fn by_name(name: &str) -> Vec<String> {
     let of_section = |section: &'static Section| Some(of_key(section, section.key(name)?));

@@ -146,7 +146,10 @@ fn may_be_extended(deck: &Deck) -> bool {
         .boundaries
         .iter()
         .any(|boundary| boundary.rotation.is_some() || boundary.displacement.iter().any(total));
-    let load_totals = deck.loads.iter().any(|load| load.formulas().into_iter().any(of_factor));
+    let load_totals = deck
+        .loads
+        .iter()
+        .any(|load| load.formulas().into_iter().any(|(_, formula)| of_factor(formula)));
     let rigid_totals = deck.rigids.iter().any(|rigid| {
         let total = |value: &Expression| of_factor(value) || !value.depends_on_time();
         let motion = &rigid.motion;

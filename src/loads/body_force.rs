@@ -1,6 +1,6 @@
 //! f_p = b(X, x, s, t) V0 (Lagrangian eq. 24): a force per initial volume.
 
-use super::declaration::{Around, Declaration, expressions};
+use super::declaration::{Around, Declaration, all_of, expressions};
 use super::{Load, Moment, Start, scope_of};
 use crate::deck::expression::Expression;
 use crate::deck::model::Body;
@@ -29,8 +29,8 @@ impl Declaration for BodyForce {
         toml_text::expressions(&self.0)
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        self.0.iter().collect()
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        all_of("body_force", &self.0)
     }
 
     fn make<const D: usize>(&self, _start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {

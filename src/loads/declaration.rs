@@ -34,8 +34,9 @@ pub trait Declaration: Sized {
     /// The value as TOML, with every default.
     fn written(&self, bodies: &[Body]) -> String;
 
-    /// All that may depend on s or t: time steps, stages and continued runs look at it.
-    fn formulas(&self) -> Vec<&Expression>;
+    /// All formulas, with their keys below `load.INDEX`; those of a vector one after another. Time steps, stages and
+    /// continued runs ask whether they depend on s or t, and the first step does not begin while one has no value.
+    fn formulas(&self) -> Vec<(&'static str, &Expression)>;
 
     /// The body that it acts on alone.
     fn body(&self) -> Option<usize> {
@@ -59,6 +60,14 @@ pub trait Declaration: Sized {
 /// Formulas for all axes, under a key of a load.
 pub fn expressions(table: &Table<'_>, key: &str, dimension: usize) -> Got<Vec<Expression>> {
     table.expressions_if(key, dimension)?.ok_or_else(|| table.missing(key, ""))
+}
+
+/// Formulas of a vector under one key, for [`Declaration::formulas`].
+pub fn all_of<'a>(
+    key: &'static str,
+    formulas: &'a [Expression],
+) -> Vec<(&'static str, &'a Expression)> {
+    formulas.iter().map(|formula| (key, formula)).collect()
 }
 
 /// Makes the enumeration of the loads that a deck may have.
@@ -98,8 +107,16 @@ macro_rules! loads {
                 }
             }
 
+            /// The key of `[[load]]` that declares it.
+            pub(crate) fn key(&self) -> &'static str {
+                match self {
+                    $( $(#[$when])? Declared::$load(_) => <$load as Declaration>::KEY.name, )*
+                    Declared::Water(_) => "water",
+                }
+            }
+
             /// See [`Declaration::formulas`].
-            pub fn formulas(&self) -> Vec<&Expression> {
+            pub fn formulas(&self) -> Vec<(&'static str, &Expression)> {
                 match self {
                     $( $(#[$when])? Declared::$load(load) => load.formulas(), )*
                     Declared::Water(_) => Vec::new(),

@@ -1,6 +1,6 @@
 //! f_p = m_p g (Lagrangian eq. 24): gravity on the constant mass of the points.
 
-use super::declaration::{Around, Declaration, expressions};
+use super::declaration::{Around, Declaration, all_of, expressions};
 use super::{Declared, Load, Moment, Start, scope_of};
 use crate::deck::expression::{Expression, Variable};
 use crate::deck::model::Body;
@@ -40,8 +40,8 @@ impl Declaration for Gravity {
         toml_text::expressions(&self.0)
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        self.0.iter().collect()
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        all_of("gravity", &self.0)
     }
 
     fn make<const D: usize>(&self, _start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {

@@ -7,7 +7,7 @@
 
 use nalgebra::Matrix3;
 
-use super::declaration::{Around, Declaration, expressions};
+use super::declaration::{Around, Declaration, all_of, expressions};
 use super::{Load, Moment, Start, scope_of};
 use crate::deck::expression::{Expression, Jet, Smooth};
 use crate::deck::model::{Body, Frame};
@@ -36,8 +36,8 @@ impl Declaration for MadeField {
         toml_text::expressions(&self.0)
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        self.0.iter().collect()
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        all_of("manufactured", &self.0)
     }
 
     fn make<const D: usize>(&self, _start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {

@@ -281,6 +281,9 @@ fix = ["x", "y"]
         let wind = "wind = { side = 1.0, area = 3.0, speed = \"30*s\", coefficient = 0.8 }";
         let deck = read(wind).expect("a load");
         assert!(deck.loads[0].depends_on_time());
+        let keys: Vec<&str> = deck.loads[0].formulas().iter().map(|(key, _)| *key).collect();
+        assert_eq!(keys, ["wind.speed"]);
+        assert_eq!(deck::explain::unit_of("load.wind.speed"), "m/s");
         let text = deck::resolved(&deck);
         let expected = "wind = { side = 1.0, area = 3.0, density = 1.25, speed = \"30*s\", \
                         exponent = 0.2, coefficient = 0.8 }";

@@ -3,7 +3,7 @@
 //! Points hold a constant force themselves (`points.point_force`, moved and stored with them). A
 //! function of s or t is held here, with the identities of the points that carry it.
 
-use super::declaration::{Around, Declaration, expressions};
+use super::declaration::{Around, Declaration, all_of, expressions};
 use super::{Load, Moment, Start};
 use crate::deck::expression::Expression;
 use crate::deck::model::Body;
@@ -64,8 +64,8 @@ impl Declaration for Point {
         ])
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        self.force.iter().collect()
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        all_of("point.force", &self.force)
     }
 
     fn body(&self) -> Option<usize> {

@@ -126,8 +126,8 @@ impl Declaration for Pressing {
         toml_text::inline(&pairs)
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        vec![&self.value]
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        vec![("pressure.value", &self.value)]
     }
 
     fn body(&self) -> Option<usize> {

@@ -1,7 +1,7 @@
 //! t(X, s, t) A: a dead traction per initial area on a body's surface (formulations.md B.6 (b)). It
 //! acts at the surface's elements ([`crate::surface`]): `system/terms/surface.rs` hands it to the nodes.
 
-use super::declaration::{Around, Declaration, expressions};
+use super::declaration::{Around, Declaration, all_of, expressions};
 use super::{Load, OnSurface, Start};
 use crate::deck::expression::Expression;
 use crate::deck::model::{Body, BodySurface};
@@ -53,8 +53,8 @@ impl Declaration for TractionOn {
         toml_text::inline(&pairs)
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        self.value.iter().collect()
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        all_of("traction.value", &self.value)
     }
 
     fn body(&self) -> Option<usize> {

@@ -82,8 +82,8 @@ impl Declaration for Wind {
         ])
     }
 
-    fn formulas(&self) -> Vec<&Expression> {
-        vec![&self.speed]
+    fn formulas(&self) -> Vec<(&'static str, &Expression)> {
+        vec![("wind.speed", &self.speed)]
     }
 
     fn make<const D: usize>(&self, start: Start<'_, D>) -> Result<Box<dyn Load<D>>> {

@@ -1,14 +1,12 @@
 //! `[[load]]` and `[water]`.
 
-use crate::deck::expression::Expression;
-
 pub use crate::loads::Declared as Load;
 
 impl Load {
     /// Whether a value of it depends on s or t. In quasi-static runs values that hold neither are ramped with the
     /// load factor.
     pub fn depends_on_time(&self) -> bool {
-        self.formulas().into_iter().any(Expression::depends_on_time)
+        self.formulas().into_iter().any(|(_, formula)| formula.depends_on_time())
     }
 }
 

@@ -1,14 +1,12 @@
 //! What the state at the start shows of a deck: formulas without a value there, and conditions that
 //! act on nothing. Found before anything is solved or written.
 
-use crate::deck::model::{AnalysisType, Boundary, Deck, Load, Place, Symmetry};
+use crate::deck::model::{AnalysisType, Boundary, Deck, Place, Symmetry};
 use crate::deck::schema::AXES;
-use crate::deck::{Presence, Scope, When, figure};
+use crate::deck::{Presence, When, figure};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
-use crate::loads::pressure::PressureAt;
-use crate::loads::{BodyForce, Gravity, Moment, OnSurface, Point, scope_of};
-use crate::material::local;
+use crate::loads::Moment;
 use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
@@ -16,8 +14,11 @@ use crate::system::numbering::Numbering;
 
 use crate::analysis::implicit;
 use crate::system::model::Model;
+use crate::system::unknowns::Unknowns;
 
 use super::contest::Contest;
+use super::faulty::{of_first_point, place};
+use super::loads;
 
 /// Evaluates initial velocities, and loads and boundaries at both ends of the first step, at all
 /// points and nodes. Returns warnings. Errors name the key, its line and a point. Collective.
@@ -30,7 +31,7 @@ pub fn check<const D: usize>(
     let span = first_span(&model.deck);
     velocities(world, &model.deck, points)?;
     if model.deck.analysis.kind != AnalysisType::Conditioning {
-        loads(world, model, points, span)?;
+        loads::check(world, model, points, span)?;
     }
     boundaries(world, model, points, numbering, span)
 }
@@ -62,109 +63,6 @@ fn velocities<const D: usize>(world: &World, deck: &Deck, points: &Points<D>) ->
         )
     });
     message.map_or(Ok(()), |message| Err(Error::Input(message)))
-}
-
-fn loads<const D: usize>(
-    world: &World,
-    model: &Model<D>,
-    points: &Points<D>,
-    span: StepSpan,
-) -> Result<()> {
-    let (deck, kind) = (&model.deck, model.deck.analysis.kind);
-    let ends = [(span.factor_start, span.time_start), (span.factor_end, span.time_end)];
-    for (index, load) in deck.loads.iter().enumerate() {
-        let message = match load {
-            Load::Point(Point { force, .. }) => ends.into_iter().find_map(|(s, t)| {
-                let scope = Scope { load_factor: s, time: t, ..Scope::default() };
-                let axis = force.iter().position(|f| !f.value(&scope).is_finite())?;
-                Some(deck.places.say(
-                    &format!("load.{index}.point.force"),
-                    &format!(
-                        "{} is {} N at s = {s}, t = {t} s: the expression is not finite there",
-                        AXES[axis],
-                        force[axis].value(&scope)
-                    ),
-                ))
-            }),
-            load if load.surface().is_some() => on_surface(model, index, ends),
-            Load::Gravity(Gravity(force)) | Load::BodyForce(BodyForce(force)) => {
-                let (key, unit) = match load {
-                    Load::Gravity(_) => ("gravity", "m/s2"),
-                    _ => ("body_force", "N/m3"),
-                };
-                let fault = |p: usize| {
-                    ends.into_iter().find_map(|(s, t)| {
-                        let scope = scope_of(points, p, s, t);
-                        let values = force.iter().map(|f| f.value(&scope)).enumerate();
-                        let (axis, value) = values.into_iter().find(|(_, f)| !f.is_finite())?;
-                        Some((axis, value, s, t))
-                    })
-                };
-                of_first_point(world, points, fault, |p, (axis, value, s, t)| {
-                    let t = if kind.has_time() { format!(", t = {t} s") } else { String::new() };
-                    deck.places.say(
-                        &format!("load.{index}.{key}"),
-                        &format!(
-                            "{} is {value} {unit} at {}, s = {s}{t}: the expression is not finite \
-                             there",
-                            AXES[axis],
-                            place(points, p)
-                        ),
-                    )
-                })
-            }
-            Load::Pressing(_) => {
-                let Some(pressure) = model.loads[index].pressure() else { continue };
-                let fault = |p: usize| {
-                    ends.into_iter().find_map(|(s, t)| {
-                        let mut found = PressureAt::<D>::default();
-                        let (x, reach) = (&points.position[p], &points.half_length[p]);
-                        let when = When { stage: 0, factor: s, time: t };
-                        let at = Moment::new(kind, Presence::default(), when);
-                        pressure.add_at(x, reach, (at, 1.0), &mut found);
-                        (!found.is_finite()).then_some((found.value, s))
-                    })
-                };
-                of_first_point(world, points, fault, |p, (value, s)| {
-                    deck.places.say(
-                        &format!("load.{index}.pressure.value"),
-                        &format!(
-                            "is {value} Pa at {}, s = {s}: the expression or a derivative of it \
-                             is not finite there",
-                            place(points, p)
-                        ),
-                    )
-                })
-            }
-            Load::MadeField(_) => {
-                let Some(field) = &model.manufactured else { continue };
-                let fault = |p: usize| {
-                    ends.into_iter().find(|&(s, t)| {
-                        let material = local(&model.materials, points, p);
-                        let force = field.force::<D>(material, &scope_of(points, p, s, t));
-                        !force.is_ok_and(|force| force.iter().all(|f| f.is_finite()))
-                    })
-                };
-                of_first_point(world, points, fault, |p, (s, t)| {
-                    let material = local(&model.materials, points, p);
-                    let why = match field.force::<D>(material, &scope_of(points, p, s, t)) {
-                        Err(why) => why.to_string(),
-                        Ok(force) => format!(
-                            "the force is {force:?} N/m3 at {}, s = {s}: not finite",
-                            place(points, p)
-                        ),
-                    };
-                    deck.places.say(&format!("load.{index}.manufactured"), &why)
-                })
-            }
-            // Others are asked in each step.
-            _ => None,
-        };
-        if let Some(message) = message {
-            return Err(Error::Input(message));
-        }
-    }
-    Ok(())
 }
 
 fn boundaries<const D: usize>(
@@ -206,12 +104,12 @@ fn boundaries<const D: usize>(
             prescribed(model, index, span)?;
             continue;
         }
-        let alone = std::slice::from_ref(boundary);
+        let alone = (std::slice::from_ref(boundary), Unknowns::<D>::displacements());
         let basis = deck.method.basis;
         let found = Conditions::evaluate(world, grid, basis, numbering, points, alone, span);
         let found = found.and_then(|found| {
             if deck.analysis.symmetry == Symmetry::Axisymmetric {
-                found.clone().hold_axis(world, grid, numbering)?;
+                found.clone().hold_axis::<D, D>(world, grid, numbering)?;
             }
             Ok(found)
         });
@@ -232,43 +130,6 @@ fn boundaries<const D: usize>(
     }
     warnings.extend(contest.warning(world, deck, grid, numbering));
     Ok(warnings)
-}
-
-/// What is wrong with the value of a load on a surface, if anything; alike on all ranks.
-fn on_surface<const D: usize>(
-    model: &Model<D>,
-    index: usize,
-    ends: [(f64, f64); 2],
-) -> Option<String> {
-    let kind = model.deck.analysis.kind;
-    ends.into_iter().find_map(|(s, t)| {
-        let when = When { stage: 0, factor: s, time: t };
-        let at = Moment::new(kind, Presence::default(), when);
-        let (key, value, place) = match model.loads[index].on_surface()? {
-            OnSurface::Traction { surface, value } => {
-                surface.elements().iter().find_map(|own| {
-                    let place = own.element.place;
-                    let mut scope = at.scope();
-                    scope.initial[..D].copy_from_slice(&place);
-                    let values: [f64; D] = at.values(value, &scope);
-                    let wrong = values.into_iter().find(|v| !v.is_finite())?;
-                    Some(("traction.value", wrong, place))
-                })?
-            }
-            OnSurface::Pressure { surface, pressure } => {
-                surface.elements().iter().find_map(|own| {
-                    let (place, mut found) = (own.element.place, PressureAt::<D>::default());
-                    pressure.add_at(&place, &[0.0; D], (at, 1.0), &mut found);
-                    (!found.is_finite()).then_some(("pressure.value", found.value, place))
-                })?
-            }
-        };
-        let why = format!(
-            "is {value} Pa at {place:?} m on the surface, s = {s}: the expression or a derivative of \
-             it is not finite there"
-        );
-        Some(model.deck.places.say(&format!("load.{index}.{key}"), &why))
-    })
 }
 
 /// An error where the displacement of a support is not finite at an end of the first step; alike on all
@@ -325,20 +186,4 @@ fn without_nodes<const D: usize>(grid: &Grid<D>, min: &[f64], max: &[f64]) -> Op
             "holds no node of the grid: none has {name} from {from} to {to} m; nearest: {near} m"
         ))
     })
-}
-
-/// Whom `say` tells of the point with the lowest id that has a fault, on all ranks. Collective.
-fn of_first_point<const D: usize, F>(
-    world: &World,
-    points: &Points<D>,
-    fault: impl Fn(usize) -> Option<F>,
-    say: impl Fn(usize, F) -> String,
-) -> Option<String> {
-    let faulty = (0..points.len()).filter_map(|p| Some((points.id[p], p, fault(p)?)));
-    let own = faulty.min_by_key(|(id, ..)| *id);
-    world.lowest_message(own.map(|(id, p, fault)| (id, say(p, fault))))
-}
-
-fn place<const D: usize>(points: &Points<D>, p: usize) -> String {
-    format!("point {} at {:?} m", points.id[p], points.position[p])
 }
