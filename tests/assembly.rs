@@ -8,7 +8,7 @@ use std::path::Path;
 use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
-use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations, motion};
 use mpm_par::analysis::solver;
 use mpm_par::deck;
 use mpm_par::deck::model::Frame;
@@ -25,6 +25,7 @@ use mpm_par::system::scatter::{self, BlockMatrix};
 use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::ghost::ghost_matrix;
 use mpm_par::system::terms::stress;
+use mpm_par::system::unknowns::Unknowns;
 
 /// A block of material whose points lie off the middles of the cells, `per_cell` of them a side.
 fn deck_text(dimension: usize, basis: &str, per_cell: usize, plastic: bool) -> String {
@@ -157,7 +158,7 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
     let mesh = Discretisation::new(world, &model, &points)?;
     let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
     let deck = &model.deck;
-    let boundaries = &deck.boundaries;
+    let boundaries = (&deck.boundaries[..], Unknowns::<D>::displacements());
     let basis_of = deck.method.basis;
     let conditions =
         Conditions::evaluate(world, &model.grid, basis_of, numbering, &points, boundaries, span)?;
@@ -210,20 +211,21 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
     let settings = NewtonSettings {
         tolerance: 1e-9,
         max_evaluations: 10,
-        frame,
         inverted: deck.analysis.inverted_iterates,
-        symmetric: true,
     };
     let external = vec![0.0; owned];
     let grid = &model.grid;
+    let unknowns = Unknowns::displacements();
     let equations = StepEquations {
+        unknowns,
         conditions: &conditions,
         left_out: &left_out,
         external_owned: external,
-        terms: Vec::new(),
+        terms: motion::terms(world, &mesh, step, (frame, true), Vec::new())?,
+        following: None,
     };
-    let mut problem = Equilibrium::new(world, grid, &mesh, step, equations, settings)?;
-    let mut matrix = solver::matrix(world, &model, numbering, pattern)?;
+    let mut problem = Equilibrium::<D>::new(world, grid, &mesh, equations, settings);
+    let mut matrix = solver::matrix(world, grid, (numbering, pattern), unknowns, true)?;
     let (mut x, mut y) = (matrix.vector()?, matrix.vector()?);
     x.values_mut()?.copy_from_slice(&probe[..owned]);
     let iterate = &displacement[..owned];

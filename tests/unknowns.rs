@@ -1,7 +1,7 @@
 //! Unknowns per node apart from the dimension of space: one (heat) and three (made-up blocks) on the
 //! active nodes of a plane problem, through the program's numbering, sparsity, rows in the solver's
-//! memory, conditions and Ghost faces; and one through Newton's method and a step's equations, and one more than there
-//! are axes, in the plane and in space, by the program's multigrid.
+//! memory, conditions and Ghost faces; and through boundaries, a step's equations and the driver of Newton's method: one,
+//! and one more than there are axes, in the plane and in space, by the program's multigrid.
 
 mod common;
 
@@ -10,14 +10,17 @@ use std::path::Path;
 use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
-use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
-use mpm_par::analysis::solver::{self, Linear, Shape};
-use mpm_par::deck;
-use mpm_par::deck::model::{Frame, InvertedIterates};
+use mpm_par::analysis::equilibrium::StepEquations;
+use mpm_par::analysis::newton::{Attempt, System};
+use mpm_par::analysis::solver::{self, Linear, Trials};
+use mpm_par::deck::expression::Expression;
+use mpm_par::deck::model::{Boundary, Place, Rotation};
+use mpm_par::deck::{self, Presence};
 use mpm_par::parallel::World;
-use mpm_par::petsc::{Ksp, NewtonOutcome, Session};
+use mpm_par::petsc::{Ksp, Session};
+use mpm_par::points::Points;
 use mpm_par::run::setup;
-use mpm_par::system::conditions::Conditions;
+use mpm_par::system::conditions::{Conditions, StepSpan};
 use mpm_par::system::held::Held;
 use mpm_par::system::in_place::{InPlace, RowAddresses};
 use mpm_par::system::model::Model;
@@ -27,6 +30,7 @@ use mpm_par::system::terms::block::add_block;
 use mpm_par::system::terms::ghost::{Ghost, ghost_matrix};
 use mpm_par::system::terms::stress::StepPoints;
 use mpm_par::system::terms::term::{At, Health, Part, Term};
+use mpm_par::system::unknowns::Unknowns;
 
 /// The points fill whole cells, four each, so that linear fields are exact at inner nodes.
 const PLATE: &str = r#"
@@ -34,6 +38,8 @@ const PLATE: &str = r#"
 type = "implicit-dynamic"
 steps = 1
 duration = 1
+tolerance = 1e-11
+max_iterations = 12
 [method]
 basis = "mpm"
 [ghost]
@@ -245,7 +251,6 @@ fn heat_by_newton(universe: &Universe) {
     let places: Vec<[f64; 2]> =
         numbering.nodes.iter().map(|&node| model.grid.node_position(node)).collect();
     let exact: Vec<f64> = places.iter().map(|x| 1.0 + SLOPE * x[0]).collect();
-    let fixed: Vec<bool> = places.iter().map(|x| x[0] <= 0.0).collect();
     // Of an edge's node: the half cells beside it.
     let entering = |x: &[f64; 2]| match (x[0] >= 4.0, x[1] <= 0.0 || x[1] >= 2.0) {
         (true, true) => 0.25 * SLOPE * (1.0 + SLOPE * SLOPE),
@@ -253,14 +258,11 @@ fn heat_by_newton(universe: &Universe) {
         (false, _) => 0.0,
     };
     let external = places[..numbering.owned].iter().map(entering).collect();
-    let (outcome, errors) = solve_step::<2, 1>(
-        world,
-        (&model, &mesh),
-        (&exact, fixed, external),
-        Box::new(Conduction { step }),
-        (Linear::DirectOnOne, 1e-12, 1e-10),
-    );
-    assert!(outcome.iterations >= 3, "{outcome:?}");
+    let fields = Unknowns::fields(["temperature"]);
+    let of = (&model, &points, &mesh);
+    let term = Box::new(Conduction { step });
+    let Attempt { errors, .. } = solve_step(world, of, fields, (&exact, external), (term, 1e-10));
+    assert!(errors.len() >= 4, "{errors:?}");
     // Quadratic: the last errors square, down to round-off.
     let late = errors.windows(2).find(|pair| pair[0] < 1e-2).expect("an error below 1e-2");
     assert!(late[1] < 100.0 * late[0] * late[0] + 1e-13, "{errors:?}");
@@ -271,47 +273,47 @@ fn one_unknown_by_newtons_method() {
     on_ranks("one_unknown_by_newtons_method", &[1, 2, 3], heat_by_newton);
 }
 
-/// Solves a step of a `term` and of Ghost faces for fields that are held to `exact` where `fixed`, and asserts
-/// that they are found to `bound` everywhere. `external`: of the owned unknowns.
+/// Solves a step of a `term` and of Ghost faces by the program's driver of Newton's method, for fields that a
+/// boundary holds at one where x = 0, and asserts that they are `exact` everywhere, to the bound. `external`: of the
+/// owned unknowns.
 fn solve_step<const D: usize, const N: usize>(
     world: &World,
-    (model, mesh): (&Model<D>, &Discretisation<D>),
-    (exact, fixed, external): (&[f64], Vec<bool>, Vec<f64>),
-    term: Box<dyn Term<N> + '_>,
-    (linear, tolerance, bound): (Linear, f64, f64),
-) -> (NewtonOutcome, Vec<f64>) {
-    let held = |(fixed, value): (&bool, &f64)| if *fixed { *value } else { 0.0 };
-    let conditions = Conditions {
-        increment: fixed.iter().zip(exact).map(held).collect(),
-        fixed,
-        ..Conditions::default()
+    (model, points, mesh): (&Model<D>, &Points<D>, &Discretisation<D>),
+    unknowns: Unknowns<N>,
+    (exact, external): (&[f64], Vec<f64>),
+    (term, bound): (Box<dyn Term<N> + '_>, f64),
+) -> Attempt {
+    let one = || Expression::parse("1.0").expect("a number");
+    let boundary = Boundary {
+        name: "end".into(),
+        place: Place::Box { min: vec![-1.0; D], max: [vec![0.0], vec![9.0; D - 1]].concat() },
+        fix: Vec::new(),
+        displacement: (0..N).map(|k| (k, one())).collect(),
+        rotation: None,
+        presence: Presence::default(),
     };
+    let span =
+        StepSpan { stage: 0, factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 1.0 };
+    let (basis, by) = (model.deck.method.basis, (std::slice::from_ref(&boundary), unknowns));
+    let conditions =
+        Conditions::evaluate(world, &model.grid, basis, &mesh.numbering, points, by, span)
+            .expect("a sound boundary");
     let ghost = Ghost::new(world, mesh).expect("faces").expect("there are Ghost faces");
     let equations = StepEquations {
+        unknowns,
         conditions: &conditions,
         left_out: &vec![false; mesh.numbering.len()],
         external_owned: external,
         terms: vec![term, Box::new(ghost)],
+        following: None,
     };
-    let settings = NewtonSettings {
-        tolerance,
-        max_evaluations: 12,
-        frame: Frame::Previous,
-        inverted: InvertedIterates::Reject,
-        symmetric: true,
-    };
-    let mut problem = Equilibrium::<D, N>::of_terms(world, &model.grid, mesh, equations, settings);
-    let mut matrix =
-        solver::block_matrix::<N>(world, &mesh.numbering, &mesh.pattern).expect("a matrix");
-    let mut solution = matrix.vector().expect("a vector");
-    let shape = Shape { symmetric: true, search: false };
-    let mut newton = solver::newton(world, linear, shape, false, 12).expect("a solver");
-    let outcome = newton.solve(&mut problem, &mut matrix, &mut solution).expect("a solve");
-    assert!(outcome.converged, "{outcome:?}");
-    for (dof, value) in solution.values().expect("values").iter().enumerate() {
+    let system = System::new(world, model, mesh, equations).expect("equations");
+    let attempt = system.solve(world, points, &mut Trials::default()).expect("a solve");
+    let solved = attempt.end.as_ref().expect("converged");
+    for (dof, value) in solved.displacement.iter().enumerate() {
         assert!((value - exact[dof]).abs() < bound, "{dof}: {value} {}", exact[dof]);
     }
-    (outcome, problem.errors)
+    attempt
 }
 
 /// Σ_p V A ∇S · ∇u: fields that are conducted together.
@@ -365,9 +367,9 @@ impl<const D: usize, const N: usize> Term<N> for Together<'_, D, N> {
     }
 }
 
-/// Iterations by the program's multigrid where the end x = 0 of a bar is held and the flux A s enters at the other
+/// Iterations of the linear solver where the end x = 0 of a bar is held and the flux A s enters at the other
 /// one, so that the fields are linear in x with the slopes s. `size`: of the bar in `text`, m.
-fn iterations_by_multigrid<const D: usize, const N: usize>(
+fn iterations<const D: usize, const N: usize>(
     world: &World,
     (text, size, h): (&str, [f64; D], f64),
     coupling: [[f64; N]; N],
@@ -383,7 +385,6 @@ fn iterations_by_multigrid<const D: usize, const N: usize>(
         numbering.nodes.iter().map(|&node| model.grid.node_position(node)).collect();
     let exact: Vec<f64> =
         places.iter().flat_map(|x| slopes.map(|slope| 1.0 + slope * x[0])).collect();
-    let fixed: Vec<bool> = places.iter().flat_map(|x| [x[0] <= 0.0; N]).collect();
     // An inner node of the end bears the flux of a whole cell, one on an edge that of half a one.
     let entering = |x: &[f64; D]| {
         let across = (1..D).map(|a| if x[a] <= 0.0 || x[a] >= size[a] { 0.5 * h } else { h });
@@ -393,24 +394,21 @@ fn iterations_by_multigrid<const D: usize, const N: usize>(
         })
     };
     let external = places[..numbering.owned].iter().flat_map(entering).collect();
-    let (outcome, _) = solve_step::<D, N>(
-        world,
-        (&model, &mesh),
-        (&exact, fixed, external),
-        Box::new(Together { step, coupling }),
-        (Linear::Multigrid, 1e-11, 1e-8),
-    );
-    outcome.linear_iterations_max
+    let fields = Unknowns::fields(["field"; N]);
+    let term = Box::new(Together { step, coupling });
+    solve_step(world, (&model, &points, &mesh), fields, (&exact, external), (term, 1e-8))
+        .most_linear_iterations
 }
 
-/// One more unknown than axes. Levels of constants take hardly more iterations on cells of half the size.
+/// One more unknown than axes, with the program's multigrid. Levels of constants take hardly more iterations on cells of half the size.
 fn more_by_multigrid(universe: &Universe) {
-    let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
+    let _session =
+        Session::start(universe, &[("qs_pc_type".into(), "mg".into())], &[]).expect("PETSc starts");
     let world = &World::new(universe.world().duplicate());
     let coupling = [[2.0, 0.5, 0.0], [0.5, 3.0, 1.0], [0.0, 1.0, 2.0]];
     let [coarse, fine] = [0.125, 0.0625].map(|h| {
         let text = PLATE.replace("h = 0.5", &format!("h = {h}"));
-        iterations_by_multigrid::<2, 3>(world, (&text, [4.0, 2.0], h), coupling)
+        iterations::<2, 3>(world, (&text, [4.0, 2.0], h), coupling)
     });
     assert!(coarse <= 25 && fine <= coarse + 5, "{coarse} {fine}");
 
@@ -422,11 +420,60 @@ fn more_by_multigrid(universe: &Universe) {
         .replace("[2, 2]", "[2, 2, 2]");
     let coupling =
         [[2.0, 0.5, 0.0, 0.1], [0.5, 3.0, 1.0, 0.0], [0.0, 1.0, 2.0, 0.2], [0.1, 0.0, 0.2, 1.0]];
-    let count = iterations_by_multigrid::<3, 4>(world, (&text, [2.0, 1.0, 1.0], 0.25), coupling);
+    let count = iterations::<3, 4>(world, (&text, [2.0, 1.0, 1.0], 0.25), coupling);
     assert!(count <= 25, "{count}");
 }
 
 #[test]
 fn one_more_unknown_than_axes_by_multigrid() {
     on_ranks("one_more_unknown_than_axes_by_multigrid", &[1, 2, 3], more_by_multigrid);
+}
+
+/// So many equations of one unknown per node get PETSc's multigrid by default, as the program's has no levels for them.
+fn heat_by_multigrid(universe: &Universe) {
+    let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
+    let world = &World::new(universe.world().duplicate());
+    let text = PLATE.replace("h = 0.5", "h = 0.025");
+    let count = iterations::<2, 1>(world, (&text, [4.0, 2.0], 0.025), [[2.0]]);
+    assert!((2..=40).contains(&count), "{count}");
+}
+
+#[test]
+fn one_unknown_by_multigrid() {
+    on_ranks("one_unknown_by_multigrid", &[2], heat_by_multigrid);
+}
+
+/// Boundaries speak of the unknowns by their names, and what is no displacement does not rotate.
+fn refused_boundaries(universe: &Universe) {
+    let _session = Session::start(universe, &[], &[]).expect("PETSc starts");
+    let world = &World::new(universe.world().duplicate());
+    let deck = deck::read(Path::new("plate.toml"), PLATE, &[]).expect("a sound deck");
+    let (model, points) = setup::prepare::<2>(world, deck).expect("a sound problem");
+    let mesh = Discretisation::new(world, &model, &points).expect("a system");
+    let span =
+        StepSpan { stage: 0, factor_start: 0.0, factor_end: 1.0, time_start: 0.0, time_end: 1.0 };
+    let fields = Unknowns::fields(["x displacement", "y displacement", "water pressure"]);
+    let refusal = |displacement, rotation| {
+        let boundary = Boundary {
+            name: "rim".into(),
+            place: Place::Box { min: vec![-1.0; 2], max: vec![9.0; 2] },
+            fix: Vec::new(),
+            displacement,
+            rotation,
+            presence: Presence::default(),
+        };
+        let (basis, by) = (model.deck.method.basis, (&[boundary][..], fields));
+        let of = &mesh.numbering;
+        let found = Conditions::evaluate(world, &model.grid, basis, of, &points, by, span);
+        found.expect_err("refused").to_string()
+    };
+    let text = refusal(vec![(2, Expression::parse("1/(X-X)").expect("valid"))], None);
+    assert!(text.contains("water pressure") && text.contains("finite"), "{text}");
+    let text = refusal(Vec::new(), Some(Rotation { centre: vec![0.0; 2], degrees: 1.0 }));
+    assert!(text.contains("rotates") && text.contains("water pressure"), "{text}");
+}
+
+#[test]
+fn boundaries_of_other_unknowns_are_checked() {
+    on_ranks("boundaries_of_other_unknowns_are_checked", &[1, 2], refused_boundaries);
 }

@@ -12,7 +12,7 @@ use std::path::Path;
 
 use counts::Numbers;
 use limits::Machine;
-use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
+use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations, motion};
 use mpm_par::analysis::solver;
 use mpm_par::error::Result;
 use mpm_par::mechanics::{self, StepStart};
@@ -27,6 +27,7 @@ use mpm_par::system::numbering::Numbering;
 use mpm_par::system::scatter::BlockMatrix;
 use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::stress::{self, displacement_gradient};
+use mpm_par::system::unknowns::Unknowns;
 use mpm_par::transfer::update;
 use mpm_par::{basis, deck};
 use report::{Sample, machine, resident_bytes, sample, sample_parts};
@@ -288,7 +289,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         model.deck.method.basis,
         &mesh.numbering,
         &points,
-        &model.deck.boundaries,
+        (&model.deck.boundaries, Unknowns::<D>::displacements()),
         SPAN,
     )?;
     let numbering = &mesh.numbering;
@@ -341,21 +342,23 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     let settings = NewtonSettings {
         tolerance: 1e-9,
         max_evaluations: 10,
-        frame,
         inverted: model.deck.analysis.inverted_iterates,
-        symmetric: true,
     };
     let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
     let owned = numbering.owned * D;
-    let empty = || solver::matrix(world, &model, numbering, &mesh.pattern);
-    let equations = || {
+    let (of, unknowns) = ((numbering, &mesh.pattern), Unknowns::displacements());
+    let empty = || solver::matrix(world, &model.grid, of, unknowns, true);
+    let equations = || -> Result<_> {
+        let terms = motion::terms(world, &mesh, step, (frame, true), Vec::new())?;
         let equations = StepEquations {
+            unknowns,
             conditions: &conditions,
             left_out: &left_out,
             external_owned: vec![0.0; owned],
-            terms: Vec::new(),
+            terms,
+            following: None,
         };
-        Equilibrium::new(world, &model.grid, &mesh, step, equations, settings)
+        Ok(Equilibrium::<D>::new(world, &model.grid, &mesh, equations, settings))
     };
     let matrix_cost = sample(count, || {
         black_box((empty().is_ok(), equations().is_ok()));

@@ -1,4 +1,4 @@
-//! Multigrid by smoothed aggregation for systems of nodal displacements: the hierarchy of levels
+//! Multigrid by smoothed aggregation for systems of nodal displacements and of other fields: the hierarchy of levels
 //! that the solver's cycle runs on (Vanek, Mandel and Brezina, Computing 56 (1996) 179).
 //!
 //! | step | file |
@@ -45,6 +45,7 @@ use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
 use crate::system::numbering::Numbering;
+use crate::system::unknowns::Unknowns;
 
 pub use block_smoother::BlockSmoother;
 pub use cycle::{CoarsestRows, Hierarchy, Levelled, Levels, Smoothed};
@@ -78,18 +79,18 @@ struct Coarsening {
 const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
 const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
-/// The hierarchy under an assembled system, which may be `symmetric` or not; `ties`: what penalties do to it. `N`
-/// unknowns per node are displacements where space has as many axes; others are smooth where each is constant. `None`
-/// for one of these, of which there are no products by blocks, and for more than four. Collective.
+/// The hierarchy under an assembled system, which may be `symmetric` or not; `ties`: what penalties do to it. Fields
+/// that are no displacements are smooth where each is constant. `None` for one of these, of which there are no
+/// products by blocks, and for more than four ([`serves`]). Collective.
 pub fn of_system<const D: usize, const N: usize>(
     world: &World,
     grid: &Grid<D>,
     numbering: &Numbering,
     rows: &Assembled,
     ties: &Ties<N>,
-    symmetric: bool,
+    (unknowns, symmetric): (Unknowns<N>, bool),
 ) -> Result<Option<Hierarchy>> {
-    let modes = if N == D { Modes::RigidMotions } else { Modes::Constants };
+    let modes = if unknowns.displacements { Modes::RigidMotions } else { Modes::Constants };
     let nodes = Nodes {
         position: numbering.nodes.iter().map(|&node| padded(grid.node_position(node))).collect(),
         key: numbering.nodes.iter().map(|&node| key(node as u64)).collect(),
@@ -111,6 +112,11 @@ pub fn of_system<const D: usize, const N: usize>(
         (Modes::Constants, 4, false) => build_unsymmetric::<N, 4>(world, &nodes, rows, ties),
         (Modes::Constants, ..) => Ok(None),
     }
+}
+
+/// Whether [`of_system`] has levels for such unknowns.
+pub fn serves<const N: usize>(unknowns: &Unknowns<N>) -> bool {
+    unknowns.displacements || (2..=4).contains(&N)
 }
 
 /// Nodes of the finest level without what groups are made by.

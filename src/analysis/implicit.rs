@@ -1,5 +1,5 @@
 //! f_int(u) + K_G u (+ inertia) = f_ext, step by step: quasi-static analysis (Lagrangian §6.3-6.5,
-//! Ghost §2.4) and implicit dynamics, which is the same with inertia ([`super::inertial`]). A step:
+//! Ghost §2.4), and with inertia ([`super::inertial`]) implicit dynamics. A step:
 //! locate, map, number, {assemble, solve}*, update.
 
 use crate::deck::Deck;
@@ -19,12 +19,14 @@ use crate::system::step_system::{Coupling, Discretisation};
 use crate::system::terms::Term;
 use crate::system::terms::contact::ContactTerm;
 use crate::system::terms::facing::FacingTerm;
+use crate::system::terms::following::Following;
 use crate::system::terms::surface::Borne;
 use crate::system::terms::touching;
+use crate::system::unknowns::Unknowns;
 use crate::transfer::refusal::{Cause, Halt, Refusal};
 use crate::transfer::update;
 
-use super::equilibrium::StepEquations;
+use super::equilibrium::{StepEquations, motion};
 use super::external::{Loads, add};
 use super::free_bodies::FreeBodies;
 use super::free_motion::FreeMotion;
@@ -142,7 +144,8 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             if let (Some(moving), Some(contact)) = (&moving, &mut contact) {
                 moving.place(contact);
             }
-            let Run { clock, .. } = &mut *run;
+            let Run { world, model, points, recorder, clock } = &mut *run;
+            let (model, points) = (&*model, &*points);
             let (driving, inertia) = clock.time(Phase::Assemble, || {
                 Ok(match &inertial {
                     Some(inertial) => inertial.equations(&mesh, &loads),
@@ -160,9 +163,22 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             for term in inertia {
                 terms.push(term);
             }
-            let equations =
-                StepEquations { conditions, left_out, external_owned: driving.clone(), terms };
-            let solved = newton::solve(run, &mesh, equations, &mut self.trials, next)?;
+            let system = clock.time(Phase::Assemble, || {
+                let step = mesh.step_points(points, &model.materials);
+                let kind = (model.deck.method.frame, model.symmetric());
+                let following = Following::new(model, &mesh, points, span.end());
+                let equations = StepEquations {
+                    unknowns: Unknowns::displacements(),
+                    conditions,
+                    left_out,
+                    external_owned: driving.clone(),
+                    terms: motion::terms(world, &mesh, step, kind, terms)?,
+                    following: following.map(|loads| (Box::new(loads) as _, share)),
+                };
+                newton::System::new(world, model, &mesh, equations)
+            })?;
+            let attempt = system.solve(world, points, &mut self.trials)?;
+            let solved = attempt.report(world, recorder, clock, number)?;
             evaluations += solved.evaluations;
             linear_iterations += solved.linear_iterations;
             let (Some(moving), Some(contact)) = (&mut moving, &contact) else {

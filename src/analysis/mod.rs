@@ -1,4 +1,4 @@
-//! The algorithms; each reads like the papers' own.
+//! The algorithms, in the order and notation of the papers.
 //!
 //! | deck value or step | file | source |
 //! |---|---|---|
@@ -42,7 +42,7 @@ mod inertial;
 pub(crate) mod initial_balance;
 pub(crate) mod load_steps;
 pub(crate) mod newmark;
-pub(crate) mod newton;
+pub mod newton;
 mod rehearsal;
 mod release;
 pub(crate) mod round_off;

@@ -1,7 +1,9 @@
-//! One step's equations handed to Newton's method, and what comes back: the part that implicit
-//! analyses share.
+//! Newton's method on the equations of one step, with the default linear solvers: the part that implicit analyses
+//! share.
 
-use crate::deck::model::Basis;
+use std::time::Instant;
+
+use crate::basis::Domain;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::{World, traffic};
@@ -10,12 +12,11 @@ use crate::petsc::snes::NewtonOutcome;
 use crate::petsc::{Matrix, Vector};
 use crate::points::Points;
 use crate::system::conditions::StepSpan;
-use crate::system::terms::following::Following;
 
 use super::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
 use super::solver::{self, Linear, Trials};
-use super::time_loop::Next;
-use crate::record::context::Run;
+use crate::record::clock::Clock;
+use crate::record::recorder::Recorder;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
 use crate::transfer::mesh_motion;
@@ -24,7 +25,7 @@ use crate::transfer::update::{self, Increments};
 
 /// A converged step. Vectors hold the owned degrees of freedom unless said otherwise.
 pub struct Converged {
-    /// Nodal increments of local nodes, m.
+    /// Increments of the unknowns at the local nodes, m for displacements.
     pub displacement: Vec<f64>,
     /// f_int + K_G u (and the share of inertia that moves with u), N.
     pub internal: Vec<f64>,
@@ -36,93 +37,144 @@ pub struct Converged {
     pub ghost_energy: f64,
     /// Normalised residual at the end.
     pub residual: f64,
+    /// Of the residual.
     pub evaluations: usize,
+    /// Of all linear solves.
     pub linear_iterations: usize,
 }
 
 /// What the deck says about the iteration.
-pub fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
-    let deck = &model.deck;
+pub(crate) fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
+    let analysis = &model.deck.analysis;
     NewtonSettings {
-        tolerance: deck.analysis.tolerance,
-        max_evaluations: deck.analysis.max_iterations,
-        frame: deck.method.frame,
-        inverted: deck.analysis.inverted_iterates,
-        symmetric: model.symmetric(),
+        tolerance: analysis.tolerance,
+        max_evaluations: analysis.max_iterations,
+        inverted: analysis.inverted_iterates,
     }
 }
 
-/// Solves the equations of a step and reports the iterations. Collective.
-pub fn solve<const D: usize>(
-    run: &mut Run<D>,
-    mesh: &Discretisation<D>,
-    equations: StepEquations<'_, D>,
-    trials: &mut Trials,
-    Next { span, number }: Next,
-) -> std::result::Result<Converged, Halt> {
-    let Run { world, model, points, recorder, clock } = run;
-    let numbering = &mesh.numbering;
-    let step = mesh.step_points(points, &model.materials);
-    let mut problem = clock.time(Phase::Assemble, || {
-        let following = Following::new(model, mesh, points, span.end());
-        let problem = Equilibrium::new(world, &model.grid, mesh, step, equations, settings(model));
-        Ok(problem?.with_following(following, 1.0 + model.deck.analysis.hht_alpha))
-    })?;
-    let mut matrix =
-        clock.time(Phase::Assemble, || solver::matrix(world, model, numbering, &mesh.pattern))?;
-    let mut solution = matrix.vector()?;
-    let (before, waited) = (clock.elapsed(), traffic::so_far().waited);
-    let stabilised = model.stabilised();
-    let size = Size {
-        shape: solver::Shape::of(model, problem.symmetric()),
-        equations: numbering.total * D,
-        stabilised,
-        // A cell may have more nodes than corners of domains: some motions of the nodes then move no corner.
-        null_pivots: !stabilised && matches!(model.deck.method.basis, Basis::Cpdi1 | Basis::Cpdi2),
-    };
-    let (outcome, used) =
-        solve_robustly(world, &mut problem, size, trials, &mut matrix, &mut solution)?;
-    if let Some(solver) = used {
-        recorder.log.say(&format!("step {number}: multigrid failed; solved again with {solver}"));
-    }
-    let assembled = problem.assembly_seconds;
-    clock.add(Phase::Assemble, assembled);
-    // What the program waited for other ranks while the solver ran is time of the assembly, not busy. PETSc counts its
-    // own waiting.
-    clock.add_busy(assembled - (traffic::so_far().waited - waited));
-    clock.add(Phase::Solve, clock.elapsed() - before - assembled);
+/// A step's equations of `N` unknowns per node, and the matrix of their tangents.
+pub struct System<'a, const D: usize, const N: usize = D> {
+    equations: Equilibrium<'a, D, N>,
+    matrix: Matrix,
+    size: Size,
+}
 
-    recorder.iterations(world, number, &problem.errors)?;
-    if !outcome.converged {
-        let point = problem.refused_point(points);
-        let detail = world.first_message(point).map_or(String::new(), |text| format!(": {text}"));
-        let what = format!("Newton's method failed ({}){detail}", outcome.reason);
-        return Err(Refusal { cause: Cause::NotConverged, what }.into());
+impl<'a, const D: usize, const N: usize> System<'a, D, N> {
+    /// Before the first iterate. Collective.
+    pub fn new(
+        world: &'a World,
+        model: &'a Model<D>,
+        mesh: &'a Discretisation<D>,
+        equations: StepEquations<'a, N>,
+    ) -> Result<Self> {
+        let (grid, unknowns) = (&model.grid, equations.unknowns);
+        let equations = Equilibrium::new(world, grid, mesh, equations, settings(model));
+        let (of, symmetric) = ((&mesh.numbering, &mesh.pattern), equations.symmetric());
+        let matrix = solver::matrix(world, grid, of, unknowns, symmetric)?;
+        let stabilised = model.stabilised();
+        // A cell may have more nodes than corners of domains: some motions of the nodes then move no corner.
+        let by_corners =
+            matches!(model.deck.method.basis.domain(), Domain::Parallelepiped | Domain::Corners);
+        let size = Size {
+            shape: solver::Shape::of(model, unknowns, symmetric),
+            equations: mesh.numbering.total * N,
+            stabilised,
+            null_pivots: !stabilised && by_corners,
+        };
+        Ok(System { equations, matrix, size })
     }
-    let residual = problem.errors.last().copied().unwrap_or(0.0);
-    if problem.at_round_off {
-        let detail = format!("(residual {residual:.1e})");
-        recorder.log.warn_of_step(number, AT_ROUND_OFF, &detail);
+
+    /// Solves for the increments of the step; `points`: those of the equations. Collective.
+    pub fn solve(self, world: &World, points: &Points<D>, trials: &mut Trials) -> Result<Attempt> {
+        let System { mut equations, mut matrix, size } = self;
+        let mut solution = matrix.vector()?;
+        let (begin, waited) = (Instant::now(), traffic::so_far().waited);
+        let (outcome, stronger) =
+            solve_robustly(world, &mut equations, size, trials, &mut matrix, &mut solution)?;
+        let (seconds, waited) = (begin.elapsed().as_secs_f64(), traffic::so_far().waited - waited);
+        let end = if outcome.converged {
+            Ok(Converged {
+                displacement: equations.displacement().to_vec(),
+                internal: equations.internal_force().to_vec(),
+                internal_start: equations.internal_force_at_start().to_vec(),
+                following: equations.following_force().to_vec(),
+                ghost_energy: world.sum(equations.ghost_energy()),
+                residual: equations.errors.last().copied().unwrap_or(0.0),
+                evaluations: equations.errors.len(),
+                linear_iterations: outcome.linear_iterations_total,
+            })
+        } else {
+            let point = world.first_message(equations.refused_point(points));
+            let detail = point.map_or(String::new(), |text| format!(": {text}"));
+            Err(format!("Newton's method failed ({}){detail}", outcome.reason))
+        };
+        Ok(Attempt {
+            end,
+            stronger,
+            most_linear_iterations: outcome.linear_iterations_max,
+            at_round_off: equations.at_round_off,
+            seconds,
+            assembly_seconds: equations.assembly_seconds,
+            waited,
+            errors: equations.errors,
+        })
     }
-    recorder.newton.add(problem.errors.len());
-    recorder.linear.add(outcome.linear_iterations_total);
-    Ok(Converged {
-        displacement: problem.displacement().to_vec(),
-        internal: problem.internal_force().to_vec(),
-        internal_start: problem.internal_force_at_start().to_vec(),
-        following: problem.following_force().to_vec(),
-        ghost_energy: world.sum(problem.ghost_energy()),
-        residual,
-        evaluations: problem.errors.len(),
-        linear_iterations: outcome.linear_iterations_total,
-    })
+}
+
+/// How Newton's method ended.
+pub struct Attempt {
+    /// A solution, or why there is none.
+    pub end: std::result::Result<Converged, String>,
+    /// Normalised residual of each iterate.
+    pub errors: Vec<f64>,
+    /// Most iterations of one linear solve.
+    pub most_linear_iterations: usize,
+    /// The solver that solved what multigrid could not.
+    stronger: Option<String>,
+    /// The last residual is above the tolerance, and all of it round-off.
+    at_round_off: bool,
+    /// Wall time of all, of the evaluations in it, and of waiting for other ranks outside PETSc, s.
+    seconds: f64,
+    assembly_seconds: f64,
+    waited: f64,
+}
+
+impl Attempt {
+    /// Tells the run's records of it, as step `number`. Refused where there is no solution. Collective.
+    pub(crate) fn report(
+        self,
+        world: &World,
+        recorder: &mut Recorder,
+        clock: &mut Clock,
+        number: usize,
+    ) -> std::result::Result<Converged, Halt> {
+        if let Some(solver) = self.stronger {
+            let text = format!("step {number}: multigrid failed; solved again with {solver}");
+            recorder.log.say(&text);
+        }
+        clock.add(Phase::Assemble, self.assembly_seconds);
+        // What the program waited for other ranks while the solver ran is time of the assembly, not busy. PETSc
+        // counts its own waiting.
+        clock.add_busy(self.assembly_seconds - self.waited);
+        clock.add(Phase::Solve, self.seconds - self.assembly_seconds);
+        recorder.iterations(world, number, &self.errors)?;
+        let solved = self.end.map_err(|what| Refusal { cause: Cause::NotConverged, what })?;
+        if self.at_round_off {
+            let detail = format!("(residual {:.1e})", solved.residual);
+            recorder.log.warn_of_step(number, AT_ROUND_OFF, &detail);
+        }
+        recorder.newton.add(solved.evaluations);
+        recorder.linear.add(solved.linear_iterations);
+        Ok(solved)
+    }
 }
 
 const AT_ROUND_OFF: &str = "the residual is above analysis.tolerance and all of it round-off: it is at \
      most what rounding leaves of the forces it is the difference of. The step counts as converged";
 
 /// What a converged step does to points and grid, not yet applied.
-pub struct Carried<const D: usize> {
+pub(crate) struct Carried<const D: usize> {
     pub made: Increments<D>,
     /// `None` where the grid does not move.
     pub moved_grid: Option<Grid<D>>,
@@ -130,7 +182,7 @@ pub struct Carried<const D: usize> {
 
 /// What the step's nodal `displacement` (local nodes, m) makes of points and grid. Refused, on every
 /// rank alike: a cell that would turn over, an unsound point, an unsound domain. Collective.
-pub fn carried<const D: usize>(
+pub(crate) fn carried<const D: usize>(
     world: &World,
     model: &Model<D>,
     mesh: &Discretisation<D>,
@@ -162,9 +214,9 @@ struct Size {
 
 /// Newton's method with the default solver; where that fails, once more from the start with the
 /// next stronger one, which is named. Collective.
-fn solve_robustly<const D: usize>(
+fn solve_robustly<const D: usize, const N: usize>(
     world: &World,
-    problem: &mut Equilibrium<'_, D>,
+    problem: &mut Equilibrium<'_, D, N>,
     size: Size,
     trials: &mut Trials,
     matrix: &mut Matrix,

@@ -2,13 +2,15 @@
 //! The user's PETSc options with the prefix `-qs_` win over all of it.
 //!
 //! The limits come from measurements (docs/evidence/performance.md). Ghost stiffness bounds the condition
-//! number, and multigrid wins early; without it multigrid may fail at any size, and nothing tells
-//! beforehand: it is tried, gives up early, and is left alone for some steps ([`Trials`]). A parallel
+//! number, and multigrid wins early. Without it multigrid may fail at any size, and no number known beforehand says
+//! when: it is tried, gives up early, and is not tried again for some steps ([`Trials`]). A parallel
 //! direct solver sums in the order in which messages arrive; on one rank it repeats bit by bit, and
 //! is faster at these sizes too.
 
+use crate::amg;
 use crate::deck::model::{AnalysisType, Locking, Tangent};
 use crate::error::Result;
+use crate::grid::Grid;
 use crate::mass::solver as mass;
 use crate::output::restart::run_state::RunState;
 use crate::parallel::World;
@@ -17,6 +19,7 @@ use crate::petsc::snes::Snes;
 use crate::petsc::{Index, factors, options};
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
+use crate::system::unknowns::Unknowns;
 
 use super::extremes;
 use super::rehearsal::Rehearsal;
@@ -172,10 +175,12 @@ impl Linear {
     }
 }
 
-/// What the tangent asks of Newton's method.
+/// What the unknowns and the tangent ask of Newton's method.
 #[derive(Debug, Clone, Copy)]
 pub struct Shape {
-    /// It equals its transposed.
+    /// The program's multigrid has levels for the unknowns ([`amg::serves`]). PETSc's takes its place otherwise.
+    pub levels: bool,
+    /// The tangent equals its transposed.
     pub symmetric: bool,
     /// A line search follows each solve. Not for F-bar alone: the volume of an iterate is off by the
     /// square of its rotation, a bulk modulus times which may be a hundred times the loads, and full
@@ -184,13 +189,17 @@ pub struct Shape {
 }
 
 impl Shape {
-    /// `symmetric`: all terms of the equations are.
-    pub fn of<const D: usize>(model: &Model<D>, symmetric: bool) -> Self {
+    /// Of `unknowns`; `symmetric`: all terms of the equations are.
+    pub fn of<const D: usize, const N: usize>(
+        model: &Model<D>,
+        unknowns: Unknowns<N>,
+        symmetric: bool,
+    ) -> Self {
         let deck = &model.deck;
         let mild = deck.method.locking == Locking::FBar
             && deck.analysis.tangent == Tangent::Auto
             && model.symmetric;
-        Shape { symmetric, search: !symmetric && !mild }
+        Shape { levels: amg::serves(&unknowns), symmetric, search: !symmetric && !mild }
     }
 }
 
@@ -224,6 +233,10 @@ fn newton_under(
 ) -> Result<Snes> {
     let mut snes = Snes::new(world.comm(), prefix, max_evaluations.saturating_sub(1).max(1))?;
     let mut defaults = linear.options(world.size(), shape.symmetric);
+    if !shape.levels && matches!(linear, Linear::Multigrid | Linear::Trial) {
+        set(&mut defaults, "pc_type", "gamg");
+        set(&mut defaults, "snes_lag_preconditioner", "1");
+    }
     if shape.search {
         defaults.push(("snes_linesearch_type", "bt".into()));
         defaults.push(("snes_linesearch_alpha", GROWTH.into()));
@@ -290,7 +303,7 @@ pub fn rehearse<const D: usize>(world: &World, model: &Model<D>, equations: usiz
     }
     let Some(rehearsal) = Rehearsal::new(PREFIX)? else { return Ok(()) };
     let linear = Linear::of::<D>(equations, model.stabilised(), &Trials::default())?;
-    let shape = Shape::of(model, model.symmetric());
+    let shape = Shape::of(model, Unknowns::<D>::displacements(), model.symmetric());
     rehearsal.newton::<D>(comm, |prefix| newton_under(prefix, world, linear, shape, false, 3))
 }
 
@@ -317,19 +330,22 @@ pub fn block_matrix<const N: usize>(
     Matrix::zeros(world.comm(), N, rows, &offsets, &columns)
 }
 
-/// The system's matrix, still zero, with its block size and near-null space. Collective.
-pub fn matrix<const D: usize>(
+/// The system's matrix, still zero, with its block size and, for displacements, rigid motions as its near-null
+/// space. `symmetric`: it will equal its transposed. Collective.
+pub fn matrix<const D: usize, const N: usize>(
     world: &World,
-    model: &Model<D>,
-    numbering: &Numbering,
-    pattern: &Pattern,
+    grid: &Grid<D>,
+    (numbering, pattern): (&Numbering, &Pattern),
+    unknowns: Unknowns<N>,
+    symmetric: bool,
 ) -> Result<Matrix> {
-    let mut matrix = block_matrix::<D>(world, numbering, pattern)?;
-    matrix.set_symmetric(model.symmetric())?;
-    let coordinates: Vec<f64> = numbering.nodes[..numbering.owned]
-        .iter()
-        .flat_map(|&node| model.grid.node_position(node))
-        .collect();
-    matrix.set_rigid_body_near_null_space(&coordinates)?;
+    let mut matrix = block_matrix::<N>(world, numbering, pattern)?;
+    matrix.set_symmetric(symmetric)?;
+    if unknowns.displacements {
+        let owned = &numbering.nodes[..numbering.owned];
+        let coordinates: Vec<f64> =
+            owned.iter().flat_map(|&node| grid.node_position(node)).collect();
+        matrix.set_rigid_body_near_null_space(&coordinates)?;
+    }
     Ok(matrix)
 }

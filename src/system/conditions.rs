@@ -3,7 +3,6 @@
 use crate::basis;
 use crate::deck::expression::Expression;
 use crate::deck::model::{Basis, Boundary, Place, Rotation};
-use crate::deck::schema::AXES;
 use crate::deck::{Presence, Scope, When};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -11,6 +10,7 @@ use crate::parallel::World;
 use crate::points::Points;
 
 use super::numbering::Numbering;
+use super::unknowns::Unknowns;
 
 /// Where in the analysis a step lies: load factor and time at both ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,40 +48,41 @@ impl StepSpan {
     }
 }
 
-/// Prescribed increments at the local nodes (owned and ghost).
+/// Prescribed increments of the unknowns, `N` per node, at the local nodes (owned and ghost).
 #[derive(Debug, Clone, Default)]
 pub struct Conditions {
-    /// Per local degree of freedom (node * D + component): held by a condition.
+    /// Per local degree of freedom (node * N + component): held by a condition.
     pub fixed: Vec<bool>,
-    /// Increment over the step, m; zero where free.
+    /// Increment over the step, m for displacements; zero where free.
     pub increment: Vec<f64>,
-    /// Owned degrees of freedom whose reaction is that of each boundary of the deck, ascending. Where
-    /// several hold a component of a node it is that of the one whose motion the node follows, of
-    /// equal ones the first in the deck: every reaction counts once.
+    /// For each boundary of the deck the owned degrees of freedom that it takes the reaction of, ascending. Every
+    /// reaction counts once: of several boundaries that hold a component of a node the one takes it whose motion
+    /// the node follows, and of equal motions the first in the deck.
     pub members: Vec<Vec<u32>>,
     /// Local nodes that each boundary holds in some component, ascending, shared ones included.
     pub held_nodes: Vec<Vec<u32>>,
 }
 
 impl Conditions {
-    /// Evaluates the deck's boundaries for one step. Collective.
-    pub fn evaluate<const D: usize>(
+    /// Evaluates boundaries for one step: components of a boundary count the unknowns of a node. Collective.
+    /// Error: an increment is not finite, two boundaries disagree, or one rotates what is no displacement.
+    pub fn evaluate<const D: usize, const N: usize>(
         world: &World,
         grid: &Grid<D>,
         basis: Basis,
         numbering: &Numbering,
         points: &Points<D>,
-        boundaries: &[Boundary],
+        (boundaries, unknowns): (&[Boundary], Unknowns<N>),
         span: StepSpan,
     ) -> Result<Self> {
         let mut conditions = Conditions {
-            fixed: vec![false; numbering.len() * D],
-            increment: vec![0.0; numbering.len() * D],
+            fixed: vec![false; numbering.len() * N],
+            increment: vec![0.0; numbering.len() * N],
             members: vec![Vec::new(); boundaries.len()],
             held_nodes: vec![Vec::new(); boundaries.len()],
         };
         // Place in the deck of the boundary that a degree of freedom follows.
-        let mut leader = vec![usize::MAX; numbering.len() * D];
+        let mut leader = vec![usize::MAX; numbering.len() * N];
         let mut problem = None;
         let held_now = |boundary: &Boundary| boundary.presence.holds_in(span.stage);
         for (b, boundary) in boundaries.iter().enumerate().filter(|(_, b)| held_now(b)) {
@@ -90,7 +91,7 @@ impl Conditions {
             for local in (0..numbering.len()).filter(|&local| inside[local]) {
                 let node = numbering.nodes[local];
                 conditions.held_nodes[b].push(local as u32);
-                let mut held: [Option<f64>; D] = [None; D];
+                let mut held = [None; N];
                 for &component in &boundary.fix {
                     held[component] = Some(0.0);
                 }
@@ -99,6 +100,13 @@ impl Conditions {
                     held[*component] = Some(increment_of(expression, &start, span));
                 }
                 if let Some(rotation) = &boundary.rotation {
+                    if !unknowns.displacements {
+                        problem = problem.or(Some(format!(
+                            "boundary \"{}\" rotates nodes whose unknowns are {}: only displacements rotate",
+                            boundary.name,
+                            unknowns.names.join(", ")
+                        )));
+                    }
                     // About z: the third component is the other keys'.
                     let turn = rotated(rotation, &grid.node_position(node), span);
                     for (slot, value) in held.iter_mut().zip(turn) {
@@ -107,13 +115,13 @@ impl Conditions {
                 }
                 for (component, value) in held.iter().enumerate() {
                     let Some(value) = *value else { continue };
-                    let dof = local * D + component;
+                    let dof = local * N + component;
                     if !value.is_finite() {
                         problem = problem.or(Some(format!(
                             "boundary \"{}\" moves {} of the node at {:?} by \
                              {value}: its expression is not finite there",
                             boundary.name,
-                            AXES[component],
+                            unknowns.names[component],
                             grid.node_position(node),
                         )));
                     }
@@ -124,7 +132,7 @@ impl Conditions {
                              {value} in this step, but an earlier boundary moves it by {}; let \
                              one of them leave the node out",
                             boundary.name,
-                            AXES[component],
+                            unknowns.names[component],
                             grid.node_position(node),
                             conditions.increment[dof]
                         )));
@@ -139,7 +147,7 @@ impl Conditions {
                 }
             }
         }
-        for (dof, &b) in leader[..numbering.owned * D].iter().enumerate() {
+        for (dof, &b) in leader[..numbering.owned * N].iter().enumerate() {
             if let Some(members) = conditions.members.get_mut(b) {
                 members.push(dof as u32);
             }
@@ -153,9 +161,9 @@ impl Conditions {
 
 impl Conditions {
     /// Holds x of the nodes on the axis x = 0 of a body of revolution, where u_r / r has no other value
-    /// that stays finite. Their reaction is nobody's: it acts on a ring of no radius. Collective. Error:
-    /// a boundary of the deck moves one off the axis.
-    pub fn hold_axis<const D: usize>(
+    /// that stays finite: the first of `N` unknowns is u_r. No boundary has their reaction, as it acts on a ring
+    /// of no radius. Collective. Error: a boundary of the deck moves one off the axis.
+    pub fn hold_axis<const D: usize, const N: usize>(
         &mut self,
         world: &World,
         grid: &Grid<D>,
@@ -168,14 +176,14 @@ impl Conditions {
             if x[0].abs() > slack {
                 continue;
             }
-            if self.increment[local * D] != 0.0 {
+            if self.increment[local * N] != 0.0 {
                 problem.get_or_insert(format!(
                     "a boundary moves x of the node at {x:?} by {} in this step, off the axis x = 0 of a \
                      body of revolution, which keeps its place; let the boundary leave the node out",
-                    self.increment[local * D]
+                    self.increment[local * N]
                 ));
             }
-            self.fixed[local * D] = true;
+            self.fixed[local * N] = true;
         }
         match world.first_message(problem) {
             Some(problem) => Err(Error::Input(problem)),

@@ -24,6 +24,7 @@
 //! | `apart.rs` | no body overlaps a rigid one that comes |
 //! | `facing.rs` | elements of surfaces that face another body |
 //! | `shared_nodes.rs` | where bodies in velocity fields of their own meet |
+//! | `unknowns.rs` | what the unknowns of a node are |
 //! | `terms/` | contributions to the equations |
 
 pub(crate) mod apart;
@@ -48,3 +49,4 @@ pub mod step_system;
 pub(crate) mod support_columns;
 pub(crate) mod supports;
 pub mod terms;
+pub mod unknowns;

@@ -11,6 +11,7 @@ use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::terms::stress::StepPoints;
 use super::terms::surface;
+use super::unknowns::Unknowns;
 use crate::basis::centre::{Moments, RowNodes};
 use crate::basis::contract::Basis;
 use crate::basis::{self, Groups, Influences, radial};
@@ -91,11 +92,11 @@ impl<const D: usize> Discretisation<D> {
             model.deck.method.basis,
             &mesh.numbering,
             points,
-            &model.deck.boundaries,
+            (&model.deck.boundaries, Unknowns::<D>::displacements()),
             span,
         )?;
         if model.deck.analysis.symmetry == Symmetry::Axisymmetric {
-            conditions.hold_axis(world, &model.grid, &mesh.numbering)?;
+            conditions.hold_axis::<D, D>(world, &model.grid, &mesh.numbering)?;
         }
         Ok((mesh, conditions))
     }

@@ -108,7 +108,8 @@ impl<const D: usize, const N: usize> Levelled for Equilibrium<'_, D, N> {
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         self.with_rows(matrix, |rows| {
             let (ties, symmetric) = (self.ties(rows)?, self.symmetric());
-            amg::of_system(self.world, self.grid, self.numbering, rows, &ties, symmetric)
+            let (of, kinds) = (self.numbering, (self.unknowns, symmetric));
+            amg::of_system(self.world, self.grid, of, rows, &ties, kinds)
         })
     }
 

@@ -6,10 +6,11 @@
 
 mod error;
 mod iteration;
+pub mod motion;
 mod ties;
 
 use crate::amg::Levels;
-use crate::deck::model::{Frame, InvertedIterates};
+use crate::deck::model::InvertedIterates;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::World;
@@ -23,10 +24,9 @@ use crate::system::pattern::Pattern;
 use crate::system::scatter::{self, BlockRows};
 use crate::system::step_system::Discretisation;
 use crate::system::terms::Term;
-use crate::system::terms::following::{Follow, Following};
-use crate::system::terms::ghost::Ghost;
-use crate::system::terms::stress::{StepPoints, Stress};
+use crate::system::terms::following::Follow;
 use crate::system::terms::term::{At, Health, Part};
+use crate::system::unknowns::Unknowns;
 use std::time::Instant;
 
 /// Limits and choices of the iteration.
@@ -36,28 +36,29 @@ pub struct NewtonSettings {
     pub tolerance: f64,
     /// Evaluations, the one at zero displacement included.
     pub max_evaluations: usize,
-    /// The configuration that stresses and gradients refer to.
-    pub frame: Frame,
     /// What happens to an iterate with det dF <= 0.
     pub inverted: InvertedIterates,
-    /// The tangent equals its transposed.
-    pub symmetric: bool,
 }
 
-/// What a step's equations of `N` unknowns per node consist of beside the stress of its points.
+/// What a step's equations of `N` unknowns per node consist of.
 pub struct StepEquations<'a, const N: usize> {
+    /// What they are.
+    pub unknowns: Unknowns<N>,
     /// What boundaries prescribe.
     pub conditions: &'a Conditions,
     /// Local nodes that carry no equation of their own (`drop_below`).
     pub left_out: &'a [bool],
     /// Right-hand side of the owned degrees of freedom, N.
     pub external_owned: Vec<f64>,
-    /// Those that follow stress and Ghost stiffness, in their order.
+    /// What is summed, in this order ([`motion::terms`] for displacements). Where a tangent is unsymmetric one of
+    /// them says so, be it that of the forces that follow the motion.
     pub terms: Vec<Box<dyn Term<N> + 'a>>,
+    /// External forces that follow the motion, and their share at the step's end: 1 + alpha of the HHT method,
+    /// else 1.
+    pub following: Option<(Box<dyn Follow<N> + 'a>, f64)>,
 }
 
-/// One step's equations: `N` unknowns at each node of a grid in `D` dimensions, displacements unless
-/// its terms say otherwise. Vectors named `*_owned` hold the owned degrees of freedom, the others the
+/// One step's equations: `N` unknowns at each node of a grid in `D` dimensions. Vectors named `*_owned` hold the owned degrees of freedom, the others the
 /// local ones (owned, then ghosts).
 pub struct Equilibrium<'a, const D: usize, const N: usize = D> {
     world: &'a World,
@@ -65,6 +66,7 @@ pub struct Equilibrium<'a, const D: usize, const N: usize = D> {
     numbering: &'a Numbering,
     pattern: &'a Pattern,
     settings: NewtonSettings,
+    unknowns: Unknowns<N>,
     /// Fixed by a condition, or left out (`drop_below`).
     held: Held,
     increment: Vec<f64>,
@@ -146,48 +148,17 @@ enum Tangent {
     Constrained,
 }
 
-impl<'a, const D: usize> Equilibrium<'a, D> {
-    /// The equations of one step for the displacements, before any iterate.
-    pub fn new(
-        world: &'a World,
-        grid: &'a Grid<D>,
-        mesh: &'a Discretisation<D>,
-        step: StepPoints<'a, D>,
-        mut equations: StepEquations<'a, D>,
-        settings: NewtonSettings,
-    ) -> Result<Self> {
-        // The terms of a step: a new one is a line here.
-        let (frame, symmetric) = (settings.frame, settings.symmetric);
-        let mut terms: Vec<Box<dyn Term<D> + 'a>> =
-            vec![Box::new(Stress { step, frame, symmetric })];
-        if let Some(ghost) = Ghost::new(world, mesh)? {
-            terms.push(Box::new(ghost));
-        }
-        terms.append(&mut equations.terms);
-        equations.terms = terms;
-        Ok(Self::of_terms(world, grid, mesh, equations, settings))
-    }
-
-    /// The same equations with external forces that follow the motion; `share`: 1 + alpha of the HHT
-    /// method, else 1.
-    pub fn with_following(mut self, loads: Option<Following<'a, D>>, share: f64) -> Self {
-        let (dead, force) = (self.external_owned.clone(), Vec::new());
-        self.following = loads.map(|loads| Followed { loads: Box::new(loads), share, dead, force });
-        self
-    }
-}
-
 impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
-    /// The equations that the terms make and no others, before any iterate. Multigrid serves
-    /// displacements alone: with other unknowns the solver is any of PETSc's.
-    pub fn of_terms(
+    /// The equations of one step, before any iterate.
+    pub fn new(
         world: &'a World,
         grid: &'a Grid<D>,
         mesh: &'a Discretisation<D>,
         equations: StepEquations<'a, N>,
         settings: NewtonSettings,
     ) -> Self {
-        let StepEquations { conditions, left_out, external_owned, terms } = equations;
+        let StepEquations { unknowns, conditions, left_out, external_owned, terms, following } =
+            equations;
         let (numbering, pattern) = (&mesh.numbering, &mesh.pattern);
         let mut held = conditions.fixed.clone();
         let increment = conditions.increment.clone();
@@ -200,17 +171,22 @@ impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
         let held =
             Held::new::<N>(numbering, pattern, held, &conditions.fixed, |row| addresses.start(row));
         let beside = vec![0.0; addresses.len_beside()];
+        let following = following.map(|(loads, share)| {
+            let (dead, force) = (external_owned.clone(), Vec::new());
+            Followed { loads, share, dead, force }
+        });
         Equilibrium {
             world,
             grid,
             numbering,
             pattern,
             settings,
+            unknowns,
             held,
             increment,
             external_previous: external_owned.clone(),
             external_owned,
-            following: None,
+            following,
             terms,
             addresses,
             beside,
@@ -257,7 +233,7 @@ impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
         self.errors.clear();
     }
 
-    /// Nodal increments of the last evaluation, local nodes.
+    /// Increments of the unknowns at the last evaluation, local nodes.
     pub fn displacement(&self) -> &[f64] {
         &self.displacement
     }

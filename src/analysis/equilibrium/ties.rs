@@ -1,5 +1,5 @@
-//! What multigrid has to know of penalties: which nodes they stiffen, and what of their tangent has no
-//! definite symmetric part.
+//! Penalties as multigrid sees them: the nodes that they stiffen, and corrections where the symmetric part of their
+//! tangent is indefinite.
 
 use crate::amg::level::{Assembled, Rows};
 use crate::amg::tied::Ties;

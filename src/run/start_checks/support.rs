@@ -26,6 +26,7 @@ use crate::system::terms::surface;
 use super::pieces;
 use crate::system::model::Model;
 use crate::system::step_system;
+use crate::system::unknowns::Unknowns;
 
 /// Share of the largest eigenvalue below which a motion counts as free. The rows are exact but
 /// for rounding; a held line of a thousandth of the body's length leaves 1e-6.
@@ -154,7 +155,7 @@ fn loose<const D: usize>(
         deck.method.basis,
         numbering,
         points,
-        &deck.boundaries,
+        (&deck.boundaries, Unknowns::<D>::displacements()),
         first,
     )?;
     // Water that holds a body along an axis mostly rights it, too.
