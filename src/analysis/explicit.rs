@@ -1,6 +1,7 @@
 //! Explicit dynamics over all time steps (Ghost §2.3): what a run checks, records and leaves.
 
-use crate::deck::model::{Basis, DomainUpdate, Mass};
+use crate::basis::Domain;
+use crate::deck::model::{DomainUpdate, Mass};
 use crate::error::Result;
 use crate::mass::solver::MassSolver;
 use crate::output::restart::run_state::RunState;
@@ -141,12 +142,12 @@ impl<const D: usize> Analysis<D> for Explicit<D> {
 /// Where energy that no work brought in may come from.
 fn gaining<const D: usize>(model: &Model<D>) -> String {
     let method = &model.deck.method;
-    let cause = match (method.mass, method.basis, method.domain_update) {
-        (Mass::Lumped, Basis::Gimp, DomainUpdate::Corners) => {
+    let cause = match (method.mass, method.basis.domain(), method.domain_update) {
+        (Mass::Lumped, Domain::Box, DomainUpdate::Corners) => {
             "GIMP domains that follow nodes of little mass (domain_update = \"stretch\" does not)"
         }
         // Measured: docs/evidence/exactness.md, under "Not kept".
-        (Mass::Consistent, Basis::Gimp, update) if update != DomainUpdate::None => {
+        (Mass::Consistent, Domain::Box, update) if update != DomainUpdate::None => {
             "the time step, which with the consistent mass must be smaller where GIMP domains are \
              stretched over more than a cell (half the step, domain_update = \"none\" or mass = \
              \"lumped\" helps; a FLIP share below 1 does not)"

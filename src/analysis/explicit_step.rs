@@ -2,7 +2,8 @@
 //! v' = v + dt a (Ghost §2.3, eq. 4-11; w: [`crate::transfer::transport`]): one explicit step, stress updated
 //! first, last, or last with the velocity mapped once more.
 
-use crate::deck::model::{Basis, Mass, StressUpdate};
+use crate::basis::Domain;
+use crate::deck::model::{Mass, StressUpdate};
 use crate::output::tables::history::HistoryRow;
 use crate::parallel::World;
 use crate::petsc::log::Phase;
@@ -276,7 +277,7 @@ fn refuse<const D: usize>(
     update::require_sound(world, grid, &model.deck.boundaries, points, made)?;
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
-    let mut still = (usf && method.basis == Basis::Cpdi1).then(|| Increments {
+    let mut still = (usf && method.basis.domain() == Domain::Parallelepiped).then(|| Increments {
         deformation: Deformation {
             blocks: vec![[[0.0; D]; D]; points.len()],
             ..Deformation::default()

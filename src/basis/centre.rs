@@ -23,8 +23,7 @@ use crate::grid::{Grid, Lattice};
 use crate::points::Points;
 
 /// Moments of the material in a cell, m3: entry m is Σ V Π ξ_a over the axes a in the bits of m, ξ in [0, 1]
-/// the place in the cell. Of rings, whose V is weighted by the radius, entries 4 + m are those of
-/// 1/r, m2.
+/// the place in the cell. For rings, V is weighted by the radius, and entries 4 + m are the moments of V/r, m2.
 pub type Moments = [f64; 8];
 
 /// Local nodes of the points' rows.
@@ -56,8 +55,8 @@ pub(super) fn fill_from_points<const D: usize>(points: &Points<D>, influences: &
 }
 
 /// Means of the entries' `values` over the points of each cell, weighted by their volumes. A cell's points live
-/// on one rank, and their rows are those of the cell. A point on a face whose row was made in a cell of choice
-/// keeps its own values and is in no mean: that cell may be another rank's.
+/// on one rank, and their rows are those of the cell. A point on a face may have its row made in a cell of choice
+/// ([`Influences::replace_row`]): it keeps its own values and is in no mean, as that cell may be another rank's.
 pub(super) fn means<const D: usize, const N: usize>(
     points: &Points<D>,
     influences: &Influences<D>,
@@ -190,7 +189,7 @@ pub(super) fn fill_from_domains<const D: usize>(
     Ok(())
 }
 
-/// The part of a domain in a cell with these `moments`, whose nodes are at `entries` of the point's row.
+/// The part of a domain in a cell with these `moments`. `entries`: places of the cell's nodes in the point's row.
 pub(super) fn part_of<const D: usize>(
     share: f64,
     entries: [usize; 8],
@@ -215,8 +214,8 @@ pub(super) fn part_of<const D: usize>(
 }
 
 impl<const D: usize> Influences<D> {
-    /// Ends the next point's cells, whose row begins at `start`: their means go to the rows of F-bar, and they
-    /// are kept if there are several.
+    /// Ends the cells of the next point; `start`: the begin of its row. The means over the cells go to the rows of
+    /// F-bar. Several cells are kept beside them.
     pub(super) fn add_parts(&mut self, start: usize, parts: &[CellPart<D>]) {
         for part in parts {
             for (place, row, hoop) in part.nodes() {

@@ -6,7 +6,7 @@
 //! corner values: d/dxi_j of corner c's function has the mean sgn_cj / 2^D, and d/dx = H^-T d/dxi
 //! because H is constant. In 2D, with s = 2 H_1 and t = 2 H_2, this is Rotation's formula.
 
-use crate::deck::model::DomainUpdate;
+use crate::deck::model::{DomainUpdate, GimpEdge};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::grid::element::{determinant, inverse};
@@ -17,11 +17,23 @@ use crate::tensor::dense;
 use super::centre::{Moments, RowNodes};
 use super::contract::Basis;
 use super::corner::{self, Corners, for_each_place};
+use super::declaration::{Declaration, Domain};
 use super::domain::{self, DomainStep};
 use super::{Influences, box_means, row};
 
 /// Parallelograms or parallelepipeds that follow F.
 pub struct Cpdi1;
+
+impl Declaration for Cpdi1 {
+    const WORD: &'static str = "cpdi1";
+    const DOC: &'static str = "parallelogram domains that follow F: large rotations, extension";
+    const DOMAIN: Domain = Domain::Parallelepiped;
+    const NODES: [(usize, usize); 2] = [(8, 20), (30, 90)];
+
+    fn of_deck(_edge: GimpEdge) -> Self {
+        Cpdi1
+    }
+}
 
 impl<const D: usize> Basis<D> for Cpdi1 {
     fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {

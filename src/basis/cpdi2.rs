@@ -12,6 +12,7 @@
 //! map the diagonals exactly, and the area is half their cross product. Rotation's v_p is
 //! therefore [`Points::volume`]; in 3D the two differ at second order in the hexahedron's warp.
 
+use crate::deck::model::GimpEdge;
 use crate::deck::model::{DomainUpdate, Element};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -22,11 +23,24 @@ use crate::points::Points;
 use super::centre::{Moments, RowNodes};
 use super::contract::Basis;
 use super::corner::{self, Corners, for_each_place};
+use super::declaration::{Declaration, Domain};
 use super::domain::{self, DomainStep};
 use super::{Influences, box_means, row};
 
 /// Quadrilaterals or hexahedra whose corners follow the nodes.
 pub struct Cpdi2;
+
+impl Declaration for Cpdi2 {
+    const WORD: &'static str = "cpdi2";
+    const DOC: &'static str =
+        "quadrilateral or hexahedral domains by their corners: large distortion";
+    const DOMAIN: Domain = Domain::Corners;
+    const NODES: [(usize, usize); 2] = [(8, 20), (30, 90)];
+
+    fn of_deck(_edge: GimpEdge) -> Self {
+        Cpdi2
+    }
+}
 
 impl<const D: usize> Basis<D> for Cpdi2 {
     fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {

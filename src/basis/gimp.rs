@@ -5,6 +5,7 @@
 
 use super::centre::{self, Moments, RowNodes};
 use super::contract::Basis;
+use super::declaration::{Declaration, Domain};
 use super::domain::{self, DomainStep};
 use super::hats::{fill, spans};
 use super::product::{Line, for_each_index, push_row};
@@ -18,6 +19,17 @@ use crate::points::{Points, rectangle_corners};
 pub struct Gimp {
     /// What a domain that reaches over the grid's edge meets there.
     pub edge: GimpEdge,
+}
+
+impl Declaration for Gimp {
+    const WORD: &'static str = "gimp";
+    const DOC: &'static str = "rectangular domains: smoother, no jumps where points cross cells";
+    const DOMAIN: Domain = Domain::Box;
+    const NODES: [(usize, usize); 2] = [(6, 20), (15, 70)];
+
+    fn of_deck(edge: GimpEdge) -> Self {
+        Gimp { edge }
+    }
 }
 
 impl<const D: usize> Basis<D> for Gimp {

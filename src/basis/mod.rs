@@ -7,6 +7,7 @@
 //! | `cpdi1` | `cpdi1.rs` | Rotation §2 (iv) |
 //! | `cpdi2` | `cpdi2.rs` | Rotation §2 (iv), Lagrangian footnote 6 |
 //! | (all) | `contract.rs` | `trait Basis`: what each of them owes |
+//! | (all) | `declaration.rs` | `trait Declaration`: word of the deck, kind of domain, size of rows |
 //! | `gimp` | `hats.rs` | cells that a domain overlaps, and means of hats over it |
 //! | (both) | `corner.rs` | corners of a domain on the grid |
 //! | `domain_update` | `domain.rs` | Lagrangian eq. 32-39 |
@@ -18,6 +19,7 @@
 mod box_means;
 pub(crate) mod centre;
 pub mod contract;
+mod declaration;
 pub(crate) mod domain;
 pub(crate) mod gimp;
 pub(crate) mod groups;
@@ -27,8 +29,12 @@ mod product;
 pub(crate) mod radial;
 
 #[cfg(test)]
+#[path = "../../tests/adding/spline.rs"]
+mod spline;
+#[cfg(test)]
 mod tests;
 
+pub use declaration::{Declaration, Domain};
 pub use groups::Groups;
 
 mod cell_parts;
@@ -42,19 +48,23 @@ pub use row::Row;
 
 use rustc_hash::FxHashMap;
 
-use crate::deck::model::{Basis, GimpEdge};
+use crate::deck::choices::Choice;
+use crate::deck::model::GimpEdge;
 use crate::error::{Error, Result};
 use crate::grid::{Grid, Lattice};
 use crate::points::Points;
+use cpdi1::Cpdi1;
+use cpdi2::Cpdi2;
+use gimp::Gimp;
+use mpm::Mpm;
+#[cfg(test)]
+use spline::Spline;
 
-/// The functions of a deck. A new basis is a line here.
-pub fn of_deck<const D: usize>(basis: Basis, edge: GimpEdge) -> Box<dyn contract::Basis<D>> {
-    match basis {
-        Basis::Mpm => Box::new(mpm::Mpm),
-        Basis::Gimp => Box::new(gimp::Gimp { edge }),
-        Basis::Cpdi1 => Box::new(cpdi1::Cpdi1),
-        Basis::Cpdi2 => Box::new(cpdi2::Cpdi2),
-    }
+// A new basis is a line here.
+declaration::bases! {
+    Mpm, Gimp, Cpdi1, Cpdi2,
+    // The example of docs/develop/adding-a-basis.md.
+    #[cfg(test)] Spline,
 }
 
 /// Nodes, weights S and gradients dS/dX~ of all points of a rank, in compressed rows.
@@ -75,9 +85,9 @@ pub struct Influences<const D: usize> {
     pub hoop: Vec<f64>,
     /// The hoop row that F-bar takes in its place, 1/m; empty without F-bar or axisymmetry.
     pub centre_hoop: Vec<f64>,
-    /// With F-bar those of domains in several cells, of which `centre_gradients` has the means.
+    /// With F-bar the cells of domains that lie in several; `centre_gradients` has the means over them.
     pub parts: CellParts<D>,
-    /// Where the nodes come from, of bases that collect them place by place.
+    /// Cells of each point, for bases that collect nodes cell by cell.
     pub cells: PointCells,
 }
 
@@ -87,7 +97,7 @@ pub struct PointCells {
     /// End of each row.
     ends: Vec<usize>,
     cells: Vec<usize>,
-    /// Cell of each point whose row was made in a cell of choice.
+    /// Point to the cell that its row was made in, where that was chosen ([`Influences::replace_row`]).
     chosen: FxHashMap<usize, usize>,
 }
 
@@ -179,7 +189,7 @@ impl<const D: usize> Influences<D> {
 /// edge, where the outer cell's functions go on; only its centre must be inside.
 pub fn map_points<const D: usize>(
     grid: &Grid<D>,
-    basis: Basis,
+    basis: Declared,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
     map_points_with(grid, basis, GimpEdge::Continued, points)
@@ -188,7 +198,7 @@ pub fn map_points<const D: usize>(
 /// [`map_points`] with the deck's choice for GIMP domains that reach over the grid's edge.
 pub fn map_points_with<const D: usize>(
     grid: &Grid<D>,
-    basis: Basis,
+    basis: Declared,
     edge: GimpEdge,
     points: &Points<D>,
 ) -> Result<Influences<D>> {
@@ -201,7 +211,7 @@ pub fn map_points_with<const D: usize>(
 /// changes the answer.
 pub fn populated_cells<const D: usize>(
     grid: &Grid<D>,
-    basis: Basis,
+    basis: Declared,
     points: &Points<D>,
     p: usize,
     hint: Option<usize>,

@@ -6,7 +6,9 @@
 
 use super::centre::{self, Moments, RowNodes};
 use super::contract::Basis;
+use super::declaration::{Declaration, Domain};
 use super::{Influences, Row, outside, radial, row};
+use crate::deck::model::GimpEdge;
 use crate::error::Result;
 use crate::grid::bins::REACH;
 use crate::grid::{Grid, Lattice};
@@ -14,6 +16,17 @@ use crate::points::Points;
 
 /// Points without extent.
 pub struct Mpm;
+
+impl Declaration for Mpm {
+    const WORD: &'static str = "mpm";
+    const DOC: &'static str = "points without domains, linear shape functions";
+    const DOMAIN: Domain = Domain::None;
+    const NODES: [(usize, usize); 2] = [(4, 9), (8, 27)];
+
+    fn of_deck(_edge: GimpEdge) -> Self {
+        Mpm
+    }
+}
 
 impl<const D: usize> Basis<D> for Mpm {
     fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {

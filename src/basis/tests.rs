@@ -4,7 +4,7 @@
 
 use proptest::prelude::*;
 
-use super::{Groups, Influences, map_points, map_points_with, populated_cells};
+use super::{Groups, Influences, map_points, map_points_with, of_deck, populated_cells};
 use crate::deck::model::{Basis, GimpEdge};
 use crate::error::Error;
 use crate::grid::{Grid, Lattice};
@@ -372,4 +372,19 @@ fn groups_tell_rows_with_equal_ends_apart() {
     assert_eq!(groups.points(0), [0, 2]);
     assert_eq!(groups.nodes(1), [1, 5, 9]);
     assert!(groups.nodes(2).is_empty());
+}
+
+/// The example of the guide is a file and its name in the list: the deck knows it by that.
+#[test]
+fn a_basis_is_a_file_and_a_line() {
+    let text = "[analysis]\ntype = \"quasi-static\"\nsteps = 1\n[method]\nbasis = \"spline\"\n[grid]\ntype = \
+                \"lattice\"\norigin = [0, 0]\nsize = [4, 4]\nh = 1\n[material.m]\nmodel = \"hencky\"\nyoung = \
+                1.0\npoisson = 0.3\n[[body]]\nmaterial = \"m\"\nshape = { box = { min = [1, 1], max = [2, 2] } }\n";
+    let deck =
+        crate::deck::read(std::path::Path::new("deck.toml"), text, &[]).expect("a sound deck");
+    let basis = deck.method.basis;
+    assert_eq!((basis.name(), basis.domain()), ("spline", super::Domain::None));
+    assert!(!of_deck::<2>(basis, GimpEdge::Continued).within_cells());
+    assert!(crate::deck::resolved(&deck).contains("basis = \"spline\""));
+    assert!(crate::deck::json_schema::json_schema().to_string().contains("\"spline\""));
 }

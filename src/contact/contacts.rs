@@ -14,6 +14,7 @@ use super::pose::Pose;
 use super::surface::{Surface, length};
 use super::told;
 use super::triangles::Triangles;
+use crate::basis::Domain;
 use crate::deck::model::{self, AnalysisType, Basis, Partner, RigidShape, Symmetry};
 use crate::deck::{self, Deck, Presence};
 use crate::error::{Error, Result};
@@ -204,7 +205,7 @@ fn rubbing(pairs: &[BodyPair], body: usize) -> impl Iterator<Item = &BodyPair> {
 
 /// Corners of a point's domain that touch rigid bodies.
 pub fn corners_of(basis: Basis, dimension: usize) -> usize {
-    if basis == Basis::Mpm { 1 } else { 1 << dimension }
+    if basis.domain() == Domain::None { 1 } else { 1 << dimension }
 }
 
 /// Fields of implicit runs: bodies that no contact names together move in one field. Error: two bodies

@@ -6,6 +6,7 @@
 
 use std::f64::consts::TAU;
 
+use crate::basis::Domain;
 use crate::basis::cpdi1;
 use crate::deck::model::Basis;
 use crate::grid::lattice::CORNER_SIGNS;
@@ -27,8 +28,8 @@ impl<const D: usize> DomainCorners<D> {
     pub fn of(basis: Basis, rings: bool, points: &Points<D>, p: usize) -> Self {
         let radius = rings.then(|| points.position[p][0]);
         let x = points.position[p];
-        let positions = match basis {
-            Basis::Mpm => {
+        let positions = match basis.domain() {
+            Domain::None => {
                 let size = if rings { points.section(p) } else { points.volume(p) };
                 let side = size.abs().powf(1.0 / D as f64);
                 let edges = std::array::from_fn(|i| {
@@ -38,9 +39,9 @@ impl<const D: usize> DomainCorners<D> {
                 positions[0] = x;
                 return DomainCorners { positions, count: 1, edges, radius };
             }
-            Basis::Gimp => tilted(points, p),
-            Basis::Cpdi1 => cpdi1::corner_positions(points, p),
-            Basis::Cpdi2 => points.corners[p],
+            Domain::Box => tilted(points, p),
+            Domain::Parallelepiped => cpdi1::corner_positions(points, p),
+            Domain::Corners => points.corners[p],
         };
         // Corner 0 is the lowest one; its neighbours are 1, 3 and, in 3D, 4.
         let mut edges = [[0.0; D]; D];

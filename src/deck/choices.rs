@@ -1,7 +1,7 @@
 //! The deck's own words for the enumerations of the model.
 
 use super::model::{
-    AffineTransfer, AnalysisType, Basis, Cost, DomainUpdate, Element, ElementPath, Format, Frame,
+    AffineTransfer, AnalysisType, Cost, DomainUpdate, Element, ElementPath, Format, Frame,
     GhostScaling, GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume,
     PositionUpdate, StressUpdate, SupportMethod, Symmetry, Tangent, VerifyNorm,
 };
@@ -53,7 +53,6 @@ choices! {
     InvertedIterates { "reject" => Reject, "allow" => Allow }
     Tangent { "auto" => Auto, "unsymmetric" => Unsymmetric }
     AffineTransfer { "apic" => Apic, "tpic" => Tpic }
-    Basis { "mpm" => Mpm, "gimp" => Gimp, "cpdi1" => Cpdi1, "cpdi2" => Cpdi2 }
     DomainUpdate {
         "none" => None,
         "det" => Det,

@@ -1,19 +1,13 @@
 //! What a deck can choose from, one line each.
 
+use super::choices::Choice;
 use super::fields::FIELDS;
+use super::model::Basis;
 use super::schema;
 use super::templates::TEMPLATES;
 use crate::material::{CATALOGUE, state_variables};
 
-/// A line on each basis; a test holds it to the deck's words.
-const BASES: [(&str, &str); 4] = [
-    ("mpm", "points without domains, linear shape functions"),
-    ("gimp", "rectangular domains: smoother, no jumps where points cross cells"),
-    ("cpdi1", "parallelogram domains that follow F: large rotations, extension"),
-    ("cpdi2", "quadrilateral or hexahedral domains by their corners: large distortion"),
-];
-
-/// The same for analyses.
+/// A line on each analysis; a test holds it to the deck's words.
 const ANALYSES: [(&str, &str); 6] = [
     ("quasi-static", "equilibrium under loads that grow in steps (Newton)"),
     ("explicit", "dynamics in small steps, for impact and fast flow"),
@@ -41,7 +35,9 @@ pub fn list() -> String {
     let models: Vec<(&str, &str)> =
         CATALOGUE.iter().map(|entry| (entry.name, first_sentence(entry.doc))).collect();
     part("materials ([material.NAME] model)", pairs(&models));
-    part("bases ([method] basis)", pairs(&BASES));
+    let bases: Vec<(&str, &str)> =
+        Basis::SPELLINGS.iter().map(|(name, basis)| (*name, basis.doc())).collect();
+    part("bases ([method] basis)", pairs(&bases));
     part("analyses ([analysis] type)", pairs(&ANALYSES));
     let loads: Vec<(&str, &str)> = schema::section("load")
         .keys
@@ -91,11 +87,10 @@ fn first_sentence(text: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::deck::model::{AnalysisType, Basis};
+    use crate::deck::model::AnalysisType;
 
     #[test]
     fn every_choice_has_its_line() {
-        assert_eq!(BASES.map(|(name, _)| name), Basis::NAMES);
         assert_eq!(ANALYSES.map(|(name, _)| name), AnalysisType::NAMES);
         let text = list();
         for name in CATALOGUE.iter().map(|entry| entry.name).chain(Basis::NAMES.iter().copied()) {

@@ -22,7 +22,7 @@
 //! | `solid/` | regions bounded by triangles: STL files, terrain |
 //! | `crossing.rs` | where lines and boxes meet the boundary of a region |
 
-mod choices;
+pub(crate) mod choices;
 mod crossing;
 pub(crate) mod explain;
 pub mod expression;

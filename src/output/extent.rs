@@ -4,6 +4,7 @@ use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::SimpleCommunicator;
 
 use super::summary::{BodySummary, PeakMemory};
+use crate::basis::Domain;
 use crate::deck::model::{Basis, Symmetry};
 use crate::points::Points;
 
@@ -29,7 +30,8 @@ pub fn body_summaries<const D: usize>(
         let bound = &mut bounds[body * 4 * D..][..4 * D];
         for axis in 0..D {
             let x = points.position[p][axis];
-            let half = if basis == Basis::Mpm { side } else { points.half_length[p][axis] };
+            let half =
+                if basis.domain() == Domain::None { side } else { points.half_length[p][axis] };
             let here = [-x, x, half - x, half + x];
             for (slot, value) in here.into_iter().enumerate() {
                 bound[slot * D + axis] = bound[slot * D + axis].max(value);

@@ -2,7 +2,7 @@
 //!
 //! Lines along the last axis meet the shape in exact intervals; over the other axes these are
 //! integrated by Gauss's rule on panels that end at the shape's corners and are halved until the
-//! volume settles. Polygons come out exact, round shapes to the tolerance.
+//! volume no longer changes. Polygons come out exact, round shapes to the tolerance.
 
 use std::f64::consts::TAU;
 
@@ -61,8 +61,8 @@ impl<const D: usize> Moments<D> {
 /// Share of the box's volume to which an integral over an axis is found; the innermost integral is
 /// exact.
 const TOLERANCE: [[f64; 2]; 2] = [[1e-8, 0.0], [2e-4, 5e-5]];
-/// For a whole shape in the plane, whose volume a plan prints to four digits. What is left of a disc is
-/// 2e-8, as each halving gains two digits.
+/// For a whole shape in the plane: a plan prints its volume to four digits. The error of a disc is 2e-8, as each
+/// halving gains two digits.
 const OF_WHOLE: f64 = 1e-5;
 /// Halvings of a panel at most.
 const HALVINGS: [usize; 2] = [26, 5];

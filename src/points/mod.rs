@@ -32,6 +32,7 @@ use gather::{Gather, Moves};
 use nalgebra::Matrix3;
 pub use named::Named;
 
+use crate::basis::Domain;
 use crate::deck::model::{Basis, Method, Water};
 use crate::grid::lattice::CORNER_SIGNS;
 use crate::tensor::Spectrum;
@@ -256,7 +257,7 @@ point_fields! {
 impl<const D: usize> Points<D> {
     /// No points yet, of a basis that may read no corners: a quarter of a point's memory.
     pub fn of_basis(basis: Basis) -> Self {
-        let cornerless = matches!(basis, Basis::Mpm | Basis::Gimp);
+        let cornerless = matches!(basis.domain(), Domain::None | Domain::Box);
         Points { cornerless, ..Points::default() }
     }
 

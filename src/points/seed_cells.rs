@@ -1,7 +1,8 @@
 //! Points of bodies that fill the cells of a mesh, cell by cell.
 
+use crate::basis::Domain;
 use crate::deck::Shape;
-use crate::deck::model::{Basis, Body, BodySource, Deck, Place, Seeding};
+use crate::deck::model::{Body, BodySource, Deck, Place, Seeding};
 use crate::error::{Error, Result};
 use crate::grid::Mesh;
 use crate::grid::quadrature::SubCell;
@@ -53,7 +54,7 @@ impl<'a, const D: usize> CellSeeding<'a, D> {
         };
         // The position of a CPDI2 point is the centroid of its domain; others sit where their
         // sub-cell's centre maps to.
-        let at_centroid = deck.method.basis == Basis::Cpdi2;
+        let at_centroid = deck.method.basis.domain() == Domain::Corners;
         let asks = |place: &Place| matches!(place, Place::CellsOf { body } if *body == index);
         let outermost = deck.boundaries.iter().any(|boundary| asks(&boundary.place));
         Ok(CellSeeding { mesh, index, body, seeding, shape, cells, at_centroid, outermost })

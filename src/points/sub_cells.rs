@@ -9,6 +9,7 @@ use std::cell::RefCell;
 
 use rustc_hash::FxHashMap;
 
+use crate::basis::Domain;
 use crate::deck::model::Basis;
 use crate::deck::{Shape, Side};
 use crate::grid::Lattice;
@@ -57,7 +58,7 @@ impl<'a, const D: usize> SubCells<'a, D> {
             coverage: Coverage::new(shape),
             bounded: shape.bounds().is_some(),
             half: std::array::from_fn(|a| 0.5 * lattice.spacing[a] / counts[a] as f64),
-            joins: counts.map(|count| count > 1 || basis != Basis::Gimp),
+            joins: counts.map(|count| count > 1 || basis.domain() != Domain::Box),
             known: RefCell::default(),
         }
     }

@@ -1,5 +1,6 @@
 //! What a run is going to be: sizes, partition, estimated memory and output.
 
+use crate::basis::Domain;
 use crate::deck::fields::{self, FieldRank};
 use crate::deck::model::{Basis, Body, BodySource, Format, Symmetry};
 use crate::deck::rough;
@@ -65,15 +66,8 @@ pub fn of<const D: usize>(
 /// Points with their influences, and the matrix three times over (ours, PETSc's two parts and
 /// its preconditioner), bytes. The counts may be estimates, too.
 pub(crate) fn memory<const D: usize>(basis: Basis, points: f64, nodes: f64) -> f64 {
-    let (nodes_each, row) = match (basis, D) {
-        (Basis::Mpm, 2) => (4, 9),
-        (Basis::Mpm, _) => (8, 27),
-        (Basis::Gimp, 2) => (6, 20),
-        (Basis::Gimp, _) => (15, 70),
-        (_, 2) => (8, 20),
-        _ => (30, 90),
-    };
-    let corners = if matches!(basis, Basis::Mpm | Basis::Gimp) { 8 * D } else { 0 };
+    let (nodes_each, row) = basis.nodes(D);
+    let corners = if matches!(basis.domain(), Domain::None | Domain::Box) { 8 * D } else { 0 };
     // What affine transfers and stages carry is left out: few runs have it.
     let affine = D * D + D + D;
     let per_point = 8 * (Points::<D>::base_words() - corners - affine) + nodes_each * (16 + 8 * D);
@@ -93,8 +87,8 @@ fn bytes_per_point<const D: usize>(deck: &crate::deck::Deck) -> f64 {
         Some(rank) => rank.components(3).len().max(1),
         None => 1,
     };
-    let (corners, corner_numbers) = match deck.method.basis {
-        Basis::Mpm => (0, 0),
+    let (corners, corner_numbers) = match deck.method.basis.domain() {
+        Domain::None => (0, 0),
         _ => (3 << D, 1 << D),
     };
     let own = 7 + deck.output.fields.iter().map(numbers).sum::<usize>();

@@ -17,9 +17,9 @@ use std::f64::consts::TAU;
 
 use super::model::Model;
 use super::terms::surface::{area_of, grid_weights, place_of};
+use crate::basis::Domain;
 use crate::basis::Influences;
 use crate::contact::law::Friction;
-use crate::deck::model::Basis;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::{World, exchange};
@@ -100,7 +100,7 @@ pub fn find<const D: usize>(
     for face in own.iter().chain(&others) {
         bins.entry(bin_of(&face.place)).or_default().push(face);
     }
-    let grid_weights = model.deck.method.basis == Basis::Gimp && !model.contacts.rings;
+    let grid_weights = model.deck.method.basis.domain() == Domain::Box && !model.contacts.rings;
     let mut found = Vec::new();
     for (pair, of) in model.contacts.body_pairs.iter().enumerate() {
         for face in &own {

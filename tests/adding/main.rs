@@ -13,15 +13,16 @@ use std::path::Path;
 use common::on_ranks;
 use mpi::environment::Universe;
 use mpi::traits::*;
-use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations};
-use mpm_par::analysis::solver::{self, Linear, Shape};
+use mpm_par::analysis::equilibrium::{StepEquations, motion};
+use mpm_par::analysis::newton::System;
+use mpm_par::analysis::solver::Trials;
 use mpm_par::basis::contract::Basis;
-use mpm_par::basis::of_deck;
+use mpm_par::basis::{self, of_deck};
 use mpm_par::deck::expression::Expression;
-use mpm_par::deck::model::{self, AnalysisType, Frame, GimpEdge, InvertedIterates};
+use mpm_par::deck::model::{self, AnalysisType, Frame, GimpEdge};
 use mpm_par::deck::{self, When};
 use mpm_par::error;
-use mpm_par::grid::{Grid, Lattice};
+use mpm_par::grid::{self, Grid, Lattice};
 use mpm_par::loads::{self, Declaration, Found, Start};
 use mpm_par::material::{self, Model as _};
 use mpm_par::parallel::World;
@@ -31,6 +32,7 @@ use mpm_par::run::setup;
 use mpm_par::system::conditions::Conditions;
 use mpm_par::system::model::Model;
 use mpm_par::system::step_system::{Coupling, Discretisation};
+use mpm_par::system::unknowns::Unknowns;
 
 use foundation::Foundation;
 use spline::Spline;
@@ -97,6 +99,7 @@ ghost = "off"
 type = "implicit-dynamic"
 steps = 1
 duration = 1
+tolerance = 1e-11
 [method]
 basis = "mpm"
 [grid]
@@ -175,32 +178,20 @@ fn rest_on_springs(world: &World, basis: &dyn Basis<2>) {
         })
         .collect();
     let foundation = Foundation::new(world, &mesh, step, 1, &springs).expect("springs");
+    let kind = (Frame::Previous, true);
     let equations = StepEquations {
+        unknowns: Unknowns::displacements(),
         conditions: &conditions,
         left_out: &vec![false; numbering.len()],
         external_owned: external,
-        terms: vec![Box::new(foundation)],
+        terms: motion::terms(world, &mesh, step, kind, vec![Box::new(foundation)]).expect("terms"),
+        following: None,
     };
-    let settings = NewtonSettings {
-        tolerance: 1e-11,
-        max_evaluations: 10,
-        frame: Frame::Previous,
-        inverted: InvertedIterates::Reject,
-        symmetric: true,
-    };
-    let mut problem =
-        Equilibrium::new(world, &model.grid, &mesh, step, equations, settings).expect("equations");
-    let mut matrix = solver::matrix(world, &model, numbering, &mesh.pattern).expect("a matrix");
-    let mut solution = matrix.vector().expect("a vector");
-    let shape = Shape { symmetric: true, search: false };
-    let mut newton =
-        solver::newton(world, Linear::DirectOnOne, shape, false, 10).expect("a solver");
-    let outcome = newton.solve(&mut problem, &mut matrix, &mut solution).expect("a solve");
-    assert!(outcome.converged && outcome.iterations <= 5, "{outcome:?}");
-
-    let mut u = solution.values().expect("values").to_vec();
-    u.resize(numbering.len() * 2, 0.0);
-    numbering.halo.forward(world, &mut u, 2).expect("ghosts");
+    let system = System::new(world, &model, &mesh, equations).expect("equations");
+    let attempt = system.solve(world, &points, &mut Trials::default()).expect("a solve");
+    let solved = attempt.end.expect("converged");
+    assert!(solved.evaluations <= 6, "{:?}", attempt.errors);
+    let u = &solved.displacement;
     let wanted = -2000.0 * 10.0 * 3.0 / SUBGRADE;
     for p in (0..points.len()).filter(|&p| springs[p] > 0.0) {
         let shares = &step.influences.weights[step.influences.row(p)];

@@ -6,11 +6,12 @@
 //! the grid the third lies outside; its share goes to the outer two as 2 and -1, which continues
 //! linear fields: S sums to one and reproduces them everywhere.
 
-use mpm_par::basis::Influences;
-use mpm_par::basis::contract::Basis;
-use mpm_par::error::{Error, Result};
-use mpm_par::grid::Grid;
-use mpm_par::points::Points;
+use crate::basis::contract::Basis;
+use crate::basis::{Declaration, Domain, Influences};
+use crate::deck::model::GimpEdge;
+use crate::error::{Error, Result};
+use crate::grid::Grid;
+use crate::points::Points;
 
 /// Quadratic B-splines.
 pub struct Spline;
@@ -34,6 +35,17 @@ fn line(t: f64, cells: usize) -> Line {
         (node - 1, vec![plus(below, -1.0, above), plus(at, 2.0, above)])
     } else {
         (node - 1, vec![below, at, above])
+    }
+}
+
+impl Declaration for Spline {
+    const WORD: &'static str = "spline";
+    const DOC: &'static str = "points without domains, quadratic B-splines of a lattice";
+    const DOMAIN: Domain = Domain::None;
+    const NODES: [(usize, usize); 2] = [(9, 25), (27, 125)];
+
+    fn of_deck(_edge: GimpEdge) -> Self {
+        Spline
     }
 }
 

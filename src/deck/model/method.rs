@@ -1,5 +1,7 @@
 //! `[method]` and `[ghost]`.
 
+pub use crate::basis::Declared as Basis;
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Method {
     pub basis: Basis,
@@ -29,14 +31,6 @@ pub enum AffineTransfer {
     Apic,
     /// Its velocity gradient: a rigid rotation.
     Tpic,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Basis {
-    Mpm,
-    Gimp,
-    Cpdi1,
-    Cpdi2,
 }
 
 /// How a GIMP domain follows the deformation (Lagrangian §6.4).

@@ -1,5 +1,6 @@
 //! `[analysis]`, `[method]`, `[conditioning]`.
 
+use crate::basis::Domain;
 use crate::deck::model::{
     AffineTransfer, Analysis, AnalysisType, Basis, Damping, GimpEdge, Mass, Method, StressUpdate,
 };
@@ -252,19 +253,19 @@ fn allows_affine(
     let problem = |key: &str, text: &str| {
         Err(table.problem(key, format!("velocity_update = \"{name}\" {text}")))
     };
-    match basis {
-        Basis::Cpdi1 | Basis::Cpdi2 => {
+    match basis.domain() {
+        Domain::Parallelepiped | Domain::Corners => {
             problem("basis", "is not derived for CPDI domains; use basis = \"gimp\"")
         }
-        Basis::Mpm => problem(
+        Domain::None => problem(
             "basis",
             "divides by the spread of a point's weights, which with basis = \"mpm\" is zero on the \
              faces of cells; use basis = \"gimp\"",
         ),
-        Basis::Gimp if edge == GimpEdge::Published => {
+        Domain::Box if edge == GimpEdge::Published => {
             problem("gimp_edge", "needs functions that sum to one; use \"continued\"")
         }
-        Basis::Gimp => Ok(()),
+        Domain::Box => Ok(()),
     }
 }
 

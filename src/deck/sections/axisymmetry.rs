@@ -1,9 +1,10 @@
 //! What a body of revolution cannot have: a part beyond its axis, a turn of its section, and the
 //! bases and loads that are not derived for rings.
 
+use crate::basis::Domain;
 use crate::deck::model::{
-    AffineTransfer, Basis, BodySource, Deck, GimpEdge, Grid, Load, MeshMotion, Support,
-    SupportMethod, Symmetry,
+    AffineTransfer, BodySource, Deck, GimpEdge, Grid, Load, MeshMotion, Support, SupportMethod,
+    Symmetry,
 };
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -79,9 +80,9 @@ fn method(root: &Table<'_>, deck: &Deck) -> Got<()> {
         root.table_or_default("method", |t| Err(t.problem(key, message)))
     };
     let method = &deck.method;
-    match method.basis {
-        Basis::Mpm | Basis::Gimp => {}
-        Basis::Cpdi1 | Basis::Cpdi2 => {
+    match method.basis.domain() {
+        Domain::None | Domain::Box => {}
+        Domain::Parallelepiped | Domain::Corners => {
             let name = method.basis.name();
             return refuse(
                 "basis",
@@ -91,7 +92,7 @@ fn method(root: &Table<'_>, deck: &Deck) -> Got<()> {
             );
         }
     }
-    if method.basis == Basis::Gimp && method.gimp_edge == GimpEdge::Published {
+    if method.basis.domain() == Domain::Box && method.gimp_edge == GimpEdge::Published {
         let message = "\"published\" loses weight at the axis; with analysis.symmetry = \
                        \"axisymmetric\" use \"continued\"";
         return refuse("gimp_edge", message.into());

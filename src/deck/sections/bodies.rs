@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::{initial_stress, shapes, stages};
+use crate::basis::Domain;
 use crate::deck::expression::Expression;
 use crate::deck::model::{
     Analysis, Basis, Body, BodySource, Grid, LatticeGrid, MeshMotion, MeshSource, Method,
@@ -237,7 +238,7 @@ fn seeding(table: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Seeding> {
 fn domain_fits(lattice: &Table<'_>, spacing: f64, earlier: &EarlierSections<'_>) -> Got<()> {
     let (Grid::Lattice(grid), Some(method)) = (earlier.grid, earlier.method) else { return Ok(()) };
     let smallest = grid.spacing.iter().copied().fold(f64::INFINITY, f64::min);
-    if method.basis == Basis::Gimp && spacing > smallest * (1.0 + 1e-12) {
+    if method.basis.domain() == Domain::Box && spacing > smallest * (1.0 + 1e-12) {
         return Err(lattice.problem(
             "spacing",
             format!(

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use crate::basis::Domain;
 use crate::deck::model::{
     Basis, BodySource, Boundary, Deck, Element, Grid, LatticeGrid, Locking, MeshGrid, MeshMotion,
     MeshSource, Method, Place, Seeding,
@@ -241,7 +242,7 @@ fn motion_of(table: &Table<'_>, dimension: usize) -> Got<MeshMotion> {
 
 /// GIMP domains are boxes that are cut by the planes of a lattice.
 pub fn check_basis(table: &Table<'_>, grid: &Grid, method: &Method) -> Got<()> {
-    if matches!(grid, Grid::Mesh(_)) && method.basis == Basis::Gimp {
+    if matches!(grid, Grid::Mesh(_)) && method.basis.domain() == Domain::Box {
         return Err(table.problem_with_help(
             "type",
             "method.basis = \"gimp\" needs type = \"lattice\"",
@@ -254,7 +255,7 @@ pub fn check_basis(table: &Table<'_>, grid: &Grid, method: &Method) -> Got<()> {
             },
         ));
     }
-    let corners = matches!(method.basis, Basis::Cpdi1 | Basis::Cpdi2);
+    let corners = matches!(method.basis.domain(), Domain::Parallelepiped | Domain::Corners);
     if matches!(grid, Grid::Mesh(_)) && corners && method.locking == Locking::FBar {
         return Err(table.problem_with_help(
             "type",

@@ -90,7 +90,7 @@ fn refuse_foreign(table: &Table<'_>, model: &Entry) -> Got<()> {
     result
 }
 
-/// Reports groups of alternatives of which not exactly one is given.
+/// Error: a group of alternatives has none or several of its keys in the deck.
 fn one_of_each(table: &Table<'_>, model: &Entry) -> Got<()> {
     let mut result = Ok(());
     for (keys, why) in model.alternatives {

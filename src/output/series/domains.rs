@@ -10,13 +10,14 @@
 use super::point_field::append_vector;
 use super::xdmf::Topology;
 use crate::basis;
+use crate::basis::Domain;
 use crate::deck::model::{Basis, GimpEdge};
 use crate::points::Points;
 
 /// The shape of one sub-domain in space of `dimension`; `None` for a basis without domains.
 pub fn topology(basis: Basis, dimension: usize) -> Option<Topology> {
-    match (basis, dimension) {
-        (Basis::Mpm, _) => None,
+    match (basis.domain(), dimension) {
+        (Domain::None, _) => None,
         (_, 2) => Some(Topology::Quadrilateral),
         _ => Some(Topology::Hexahedron),
     }

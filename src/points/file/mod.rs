@@ -11,7 +11,8 @@ mod xml;
 
 use std::f64::consts::TAU;
 
-use crate::deck::model::{Basis, Deck, PointsFile, Symmetry};
+use crate::basis::Domain;
+use crate::deck::model::{Deck, PointsFile, Symmetry};
 use crate::deck::{figure, rough};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -70,7 +71,7 @@ pub fn read_points<const D: usize>(
     cloud.choose(file.of_body).map_err(refused)?;
 
     let widest = match grid {
-        Grid::Lattice(lattice) if deck.method.basis == Basis::Gimp => {
+        Grid::Lattice(lattice) if deck.method.basis.domain() == Domain::Box => {
             lattice.spacing.iter().copied().fold(f64::INFINITY, f64::min)
         }
         _ => f64::INFINITY,

@@ -9,6 +9,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
+use crate::basis::Domain;
 use crate::contact::corner::DomainCorners;
 use crate::contact::free::FreeBody;
 use crate::contact::law::{Friction, Law, Reached, Response};
@@ -238,9 +239,9 @@ impl<const D: usize> ContactTerm<D> {
     ) -> Range<usize> {
         let start = self.nodes.len();
         let x = &points.position[p];
-        let values = match basis {
-            Basis::Mpm => None,
-            Basis::Gimp => {
+        let values = match basis.domain() {
+            Domain::None => None,
+            Domain::Box => {
                 // A tilted corner may leave the cells of its point: their functions go on beyond them.
                 let half = &points.half_length[p];
                 let held: [f64; D] =

@@ -561,7 +561,7 @@ pub(crate) fn start_volume<const D: usize>(step: StepPoints<'_, D>, p: usize) ->
     }
 }
 
-/// The initial volume of which det F makes that of the domain at the step's start, m3.
+/// V_d / det F, with V_d the volume of the domain at the step's start, m3.
 #[cold]
 fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
     let (now, start) = (&points.half_length[p], &points.half_length_initial[p]);

@@ -15,9 +15,9 @@
 //! For `gimp`, whose stress is integrated over its domains exactly, what is spread over a surface goes to
 //! the nodes by the grid's own functions at the element instead, where the carrier reaches their nodes.
 
+use crate::basis::Domain;
 use crate::deck::When;
 use crate::deck::expression::Expression;
-use crate::deck::model::Basis;
 use crate::grid::Grid;
 use crate::loads::pressure::{Pressure, PressureAt};
 use crate::loads::{Moment, OnSurface, shares_of_bodies};
@@ -130,7 +130,9 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                 };
                 for own in surface.carried_by(id) {
                     term.push(step, p, own, (kind, at));
-                    if model.deck.method.basis == Basis::Gimp && step.influences.hoop.is_empty() {
+                    if model.deck.method.basis.domain() == Domain::Box
+                        && step.influences.hoop.is_empty()
+                    {
                         term.weigh_by_grid(&model.grid, step);
                     }
                 }
