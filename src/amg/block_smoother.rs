@@ -2,8 +2,8 @@
 //! penalty ties: their rows and columns are one block, and it is solved.
 //!
 //! A penalty f times as stiff as the material leaves motions along and beside its surface that are as
-//! soft as the material; Jacobi's smoother hardly sees them, as it divides by f, and the iterations
-//! grow with its root. They all live on the nodes that the penalty stiffens, a layer about the surface.
+//! soft as the material. Jacobi's smoother divides by f and hardly reduces them: iterations would grow with the
+//! root of f. They all live on the nodes that the penalty stiffens, a layer about the surface.
 
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::Communicator;

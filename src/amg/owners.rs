@@ -1,6 +1,5 @@
-//! Who owns the nodes of a coarse level: the ranks of their roots while these have plenty, then one of
-//! every 2, 4, 8, ... ranks. On a level
-//! with a few nodes on each of many ranks all time would go into messages.
+//! Who owns the nodes of a coarse level: the ranks of their roots while each has plenty of nodes, then one of
+//! every 2, 4, 8, ... ranks. With a few nodes on each of many ranks all time would go into messages.
 
 use crate::petsc::Index;
 use std::ops::Range;

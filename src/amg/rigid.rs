@@ -1,4 +1,4 @@
-//! What a coarse node does to the nodes of its group: the smooth modes that smoothed aggregation has to keep.
+//! Smooth modes that smoothed aggregation has to keep: how the nodes of a group move with their coarse node.
 //!
 //! Displacements have the rigid-body modes, displacement of the root and rotation about it: a node of a
 //! coarser level has three degrees of freedom in the plane and six in space. Other unknowns have constants, one

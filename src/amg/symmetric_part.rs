@@ -1,7 +1,6 @@
 //! S = (A + A^T) / 2: the symmetric matrix that stands for an unsymmetric one where levels are made.
 //!
-//! Of the transposed entries those of this rank's rows are here; those of other ranks' rows are sent
-//! by their owners, block by block. Where A is symmetric, S is A to the last bit.
+//! Transposed entries come from rows of this rank and of others; their owners send the latter block by block. Where A is symmetric, S is A to the last bit.
 
 use crate::error::{Error, Result};
 use crate::parallel::{HaloPlan, World, exchange};

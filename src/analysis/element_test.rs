@@ -1,5 +1,5 @@
-//! One point under a path of a laboratory test: no grid, no body, no equilibrium but that of the
-//! point's own stress with the pressure around it.
+//! One point under a path of a laboratory test, without a grid or a body. The only equilibrium is that of the
+//! point's stress with the pressure around it.
 //!
 //! Along every path but simple shear the axes of stress and strain stay: an increment adds to the
 //! principal logarithmic strains, and where the Cauchy stress is prescribed in place of the strain,

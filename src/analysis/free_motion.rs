@@ -1,6 +1,6 @@
-//! Free rigid bodies in an implicit step: their motion and the forces of contact are settled from
-//! outside, by a quasi-Newton method over the generalised forces of all bodies (force, and torque over
-//! the radius of gyration), as many unknowns as they have degrees of freedom.
+//! Free rigid bodies in an implicit step. An outer quasi-Newton iteration around the step's own solve brings their
+//! motion and the forces of contact into balance. Its unknowns are the generalised forces of all bodies (force, and
+//! torque over the radius of gyration), one per degree of freedom.
 //!
 //! With f the mean force over a step, a body goes from v to v + dt (f/m + g) and on by dt times the mean
 //! of both velocities; the step is solved with its surface there and exerts Φ(f). r(f) = Φ(f) - f is

@@ -274,7 +274,7 @@ impl InertialStep {
     }
 }
 
-/// Components whose rates the mass does not decide: held ones, and all of nodes left out.
+/// Components that are held, and those of nodes left out: the mass does not decide their rates.
 fn held_or_left_out<const D: usize>(conditions: &Conditions, left_out: &[bool]) -> Vec<bool> {
     let mut held = conditions.fixed.clone();
     for (local, _) in left_out.iter().enumerate().filter(|(_, out)| **out) {

@@ -1,8 +1,7 @@
 //! Whether initial stresses carry the loads that act at the start.
 //!
-//! At the start F = 1 whatever the stress is, so that f_int - f_ext at the free nodes is what the
-//! deck's stresses and loads leave to the first step. In a run it would come back as displacement that
-//! no load of the deck explains.
+//! At the start F = 1 whatever the stress is. f_int - f_ext at the free nodes is therefore what the deck's stresses
+//! and loads leave unbalanced. The first step would turn it into a displacement that no load of the deck explains.
 
 use crate::deck::{Deck, rough};
 use crate::error::Result;

@@ -22,7 +22,7 @@ impl Stored for f64 {
     }
 }
 
-/// Kernels load four values, of which the last of a block of 3x3 may lie beyond it.
+/// Kernels load four values at a time: the last one may lie beyond a block of 3x3.
 pub(crate) const BEYOND: usize = 1;
 
 /// Values are fetched so many bytes before they are used: the rows are too short for the processor to foresee the

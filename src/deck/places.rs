@@ -1,4 +1,4 @@
-//! Where each key of a deck is written, for faults that only a later stage can see.
+//! Line and column of each key of a deck, for messages about faults that show after reading.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What is wrong with a deck: collected, then said with file, line, column and the text itself.
+//! Faults of a deck: collected, then reported with file, line, column and the text itself.
 
 use std::cell::RefCell;
 use std::sync::Arc;

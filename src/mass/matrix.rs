@@ -3,9 +3,9 @@
 //! All are scalar, the same for each component: M ⊗ 1. The entries of M_G sum to zero, so the
 //! stabilised matrix has the mass and the momentum of the plain one.
 //!
-//! A grain that flies alone, a point none of whose nodes another point reaches, gives a matrix of rank one to all its
-//! nodes. Ghost does not help, for it takes no motion that is linear over the cells as wrong. Such a
-//! point has its row sums on the diagonal in place of it: its nodes move as it does.
+//! A point may fly alone: no other point reaches any of its nodes. Its part of M has rank one, and Ghost does not
+//! help, as it leaves motions alone that are linear over the cells. The row sums on the diagonal take the place of
+//! this part, and the nodes move as the point does.
 
 use std::ops::Range;
 

@@ -56,8 +56,8 @@ pub trait Model: Copy + Sized {
     const DOC: &'static str;
     /// What it reads from the deck.
     const PARAMETERS: &'static [Parameter];
-    /// Groups of keys of which the deck gives exactly one, with the reason that is told where it
-    /// gives none.
+    /// Groups of keys. The deck gives exactly one key of each group; the text beside it is the error where it gives
+    /// none.
     const ALTERNATIVES: &'static [(&'static [&'static str], &'static str)] = &[];
     /// Every state variable that it may have, with the initial value of its simplest form.
     const STATE: &'static [StateVariable] = &[];

@@ -1,4 +1,4 @@
-//! One rank acts, every rank learns the outcome.
+//! One rank acts, all ranks get its outcome.
 //!
 //! File work fails on one rank while the others would wait in the next collective call. Every
 //! such step therefore ends in one of these two functions.

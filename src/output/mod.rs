@@ -11,7 +11,7 @@
 //! | `terminal/` | what the terminal and `log.txt` say |
 //! | `summary.rs`, `extent.rs` | `summary.json` |
 //! | `start.rs` | what writing asks of the process before MPI starts |
-//! | `agreement.rs` | one rank acts, every rank learns the outcome |
+//! | `agreement.rs` | one rank acts, all ranks get its outcome |
 //! | `whole_file.rs` | files that are whole or absent |
 //! | `names.rs` | the names of all files in a results directory |
 //! | `ownership.rs` | which of them a run is proven to have written |

@@ -1,16 +1,16 @@
-//! Numbers of points from 0 on, without gaps. A seeding numbers its candidates, of which only those inside
-//! the shape become points; here the points are counted. Their order stays, so that whatever asks for the
-//! smallest number of several points finds the same one.
+//! Numbers of points from 0 on, without gaps. A seeding numbers its candidates, and only those inside the shape
+//! become points; here the points are numbered anew. Their order stays, so that a search for the smallest number
+//! of several points finds the same point.
 //!
-//! The range of the numbers is cut into as many parts as there are ranks. Each rank counts one part: it
-//! hears of the numbers in it, and answers. Nobody holds them all.
+//! The range of the numbers is cut into as many parts as there are ranks. Each rank receives the numbers in one
+//! part and sends back their new ones. No rank holds them all.
 
 use super::{World, exchange};
 use crate::error::Result;
 use crate::points::Points;
 
-/// Replaces the points' identities, no two of which are equal, by 0, 1, 2, ... in their order. They do not
-/// depend on who has which point. Collective.
+/// Replaces the points' identities by 0, 1, 2, ... in their order. No two identities may be equal. The new ones
+/// do not depend on which rank has which point. Collective.
 pub fn close_gaps<const D: usize>(world: &World, points: &mut Points<D>) -> Result<()> {
     let ranks = world.size() as u128;
     let own_end = points.id.iter().map(|id| id + 1).max().unwrap_or(0);

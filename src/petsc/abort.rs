@@ -1,4 +1,4 @@
-//! All ranks end at once: for failures that the others cannot learn of in an orderly way.
+//! All ranks end at once: for failures that cannot be passed on in an orderly way.
 
 use std::io::Write as _;
 use std::time::{Duration, Instant};

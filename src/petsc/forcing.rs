@@ -50,7 +50,7 @@ impl Forcing {
     }
 
     /// The relative tolerance of the next solve. `norm`: of its right-hand side; `error_over_tolerance`: the
-    /// error before it over the error that is enough, of which less than its inverse is idle.
+    /// error before it over the error that is enough. A tolerance below the inverse of that ratio is idle.
     pub fn next(&mut self, norm: f64, error_over_tolerance: f64) -> f64 {
         let rule = match self.last {
             None => self.first,

@@ -1,4 +1,4 @@
-//! A run of one point, without a grid: rank 0 computes and writes, every rank learns the outcome.
+//! A run of one point, without a grid: rank 0 computes and writes, all ranks get the outcome.
 
 use std::collections::BTreeMap;
 

@@ -93,8 +93,8 @@ pub fn equip_restored<const D: usize>(
     world.first_message(message).map_or(Ok(()), |message| Err(Error::File(message)))
 }
 
-/// Names of the state variables of each body. A body whose parameters vary carries all of its
-/// model's: what is zero at one point need not be at the next.
+/// Names of the state variables of each body. Where a body's parameters vary in space its points carry all state
+/// variables of the model, as a parameter may be zero at one point and not at the next.
 fn state_names(deck: &Deck, materials: &[Material]) -> Vec<Vec<String>> {
     let of_body = |(body, material): (&model::Body, &Material)| {
         let given = &deck.materials[body.material];

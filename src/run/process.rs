@@ -1,8 +1,8 @@
 //! Settings for the C libraries' use of memory, made before they choose their own.
 
 /// Before MPI starts. Large blocks of the set-up get their own pages, so that arrays that grow there
-/// leave no holes in the heap; and hwloc, which MPI asks about the machine, is kept from loading
-/// what only finds graphics cards and reads XML (a display server, OpenCL, libxml2, ICU).
+/// leave no holes in the heap. MPI asks hwloc about the machine; hwloc is kept from loading the libraries that find
+/// graphics cards and read XML (a display server, OpenCL, libxml2, ICU).
 pub fn before_start() {
     map_large_blocks(true);
     const LIST: &str = "HWLOC_PLUGINS_BLACKLIST";

@@ -64,7 +64,7 @@ impl<const D: usize> CellNow<D> {
     }
 }
 
-/// det dF_0 - 1 with the hoop of the cells of point `p`, whose `nodal` increments are those of its row; `rows`
+/// det dF_0 - 1, hoop included, of the cells of point `p`. `nodal`: increments of the nodes of its row; `rows`
 /// becomes its g_0.
 pub(crate) fn rows_now<const D: usize>(
     influences: &Influences<D>,

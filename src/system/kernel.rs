@@ -32,7 +32,7 @@ pub(crate) struct Batch {
     /// A batch with so many lines is full.
     capacity: usize,
     /// Lines that there is memory for: with F-bar cells may follow the last point of a full batch.
-    room: usize,
+    allocated: usize,
     /// g_aj: line (p, j), column a.
     gradients: Vec<f64>,
     /// A_ijkl g_bl V: plane i, line (p, j), column (b, k).
@@ -52,10 +52,10 @@ impl Batch {
         self.lines = 0;
         let points = (BATCH_VALUES / (D * self.depth * self.stride)).max(1);
         self.capacity = points * self.depth;
-        self.room = self.capacity + if cells { 2 * self.depth } else { 0 };
+        self.allocated = self.capacity + if cells { 2 * self.depth } else { 0 };
         // Columns beyond the last node are never read back; they only have to exist.
-        grow(&mut self.gradients, self.room * nodes);
-        grow(&mut self.flux, self.room * D * self.stride);
+        grow(&mut self.gradients, self.allocated * nodes);
+        grow(&mut self.flux, self.allocated * D * self.stride);
         grow(&mut self.strip, TALL * self.stride);
     }
 
@@ -84,7 +84,7 @@ impl Batch {
                 *target = gradient[j];
             }
         }
-        let plane = self.room * stride;
+        let plane = self.allocated * stride;
         for i in 0..D {
             for j in 0..D {
                 let tangent =
@@ -104,8 +104,8 @@ impl Batch {
         }
     }
 
-    /// Adds (Q g_a) x e_b of F-bar to the point pushed last, of which `share` has Q; `expansion`: e of the
-    /// nodes; `volume` in m3.
+    /// Adds (Q g_a) x e_b of F-bar to the point pushed last. `share` has its Q; `expansion`: e of the nodes;
+    /// `volume` in m3.
     #[inline(always)]
     pub fn push_share<const D: usize, const FUSED: bool>(
         &mut self,
@@ -113,7 +113,7 @@ impl Batch {
         share: &Expansion<D>,
         volume: f64,
     ) {
-        let plane = self.room * self.stride;
+        let plane = self.allocated * self.stride;
         let expansion = expansion.as_flattened();
         let mut add = |i: usize, line: usize, modulus: f64| {
             let start = i * plane + (self.first + line) * self.stride;
@@ -137,7 +137,7 @@ impl Batch {
     #[inline(always)]
     pub fn push_cells<const D: usize, const FUSED: bool>(&mut self, cells: &CellRows<D>) {
         let (stride, first, rings) = (self.stride, self.lines, self.depth > D);
-        let plane = self.room * stride;
+        let plane = self.allocated * stride;
         self.push_rows::<D>(cells.gradients.iter().copied().enumerate());
         let trace = if cells.is_single() { cells.trace } else { 0.0 };
         for (b, (row, hoop)) in cells.gradients.iter().enumerate() {
@@ -168,7 +168,7 @@ impl Batch {
     #[inline(always)]
     pub fn push_cell<const D: usize>(&mut self, cell: &CellNow<D>) {
         let (nodes, stride, first) = (self.nodes, self.stride, self.lines);
-        let plane = self.room * stride;
+        let plane = self.allocated * stride;
         self.gradients[first * nodes..(first + self.depth) * nodes].fill(0.0);
         self.push_rows::<D>(cell.nodes().map(|(place, row)| (place, *row)));
         for i in 0..D {
@@ -219,7 +219,7 @@ impl Batch {
     ) {
         let (nodes, stride) = (self.nodes, self.stride);
         let first = self.first;
-        let plane = self.room * stride;
+        let plane = self.allocated * stride;
         self.gradients[(first + D) * nodes..(first + D + 1) * nodes].copy_from_slice(rows);
         // What a hoop strain does to the section.
         for i in 0..D {
@@ -268,7 +268,7 @@ impl Batch {
         }
         let depth = self.lines;
         self.lines = 0;
-        let plane = self.room * self.stride;
+        let plane = self.allocated * self.stride;
         for i in 0..D {
             let flux = &self.flux[i * plane..i * plane + depth * self.stride];
             let mut a = 0;
@@ -331,7 +331,7 @@ impl Batch {
     ) {
         let (n, stride) = (self.nodes, self.stride);
         let runs = n / place.run;
-        let plane = self.room * stride;
+        let plane = self.allocated * stride;
         for (node, &(start, width)) in rows.iter().enumerate() {
             let positions = &place.positions[node * runs..(node + 1) * runs];
             let factors: [f64; D] = std::array::from_fn(|j| self.gradients[j * n + node]);

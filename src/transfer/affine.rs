@@ -98,7 +98,7 @@ impl<const D: usize> Affine<D> {
     }
 }
 
-/// Before the first step L is that of the deck's velocity; the points learn their spread.
+/// Before the first step: L becomes the gradient of the deck's velocity, and the points get their spread.
 pub fn begin<const D: usize>(
     method: &Method,
     grid: &Grid<D>,

@@ -116,8 +116,8 @@ pub fn averaged<const D: usize>(common: &[f64], deformation: &Deformation<D>) ->
 /// How a refusal says that no boundary keeps points from leaving through a side.
 pub const NOT_HELD: &str = "no boundary holds that side";
 
-/// Refuses increments with a NaN, an inverted point or a point outside the grid (as it is after the
-/// step), of which it tells which of the `boundaries` holds there. Collective.
+/// Refuses increments with a NaN, an inverted point or a point outside the grid (as it is after the step). The
+/// text about a point outside names the one of the `boundaries` that holds that side. Collective.
 pub fn require_sound<const D: usize>(
     world: &World,
     grid: &Grid<D>,

@@ -1,4 +1,4 @@
-//! Grid lines whose distance is told at some places of an axis.
+//! Grid lines along an axis, from their distance at some places.
 
 /// A place, m, and the distance of the lines there, m.
 pub type Station = [f64; 2];

@@ -1,7 +1,7 @@
 //! HDF5 files that all ranks read: the thin safe wall around its calls.
 //!
-//! A dataset is a table of rows; every rank takes the rows it wants in calls that all ranks make, and all
-//! of them learn of a fault of one. Each opens the file for itself, so that a serial HDF5 serves as well
+//! A dataset is a table of rows; every rank takes the rows it wants in calls that all ranks make. A fault of one
+//! rank is an error on all of them. Each opens the file for itself, so that a serial HDF5 serves as well
 //! as a parallel one.
 
 use std::fs;

@@ -60,7 +60,7 @@ macro_rules! point_field_table {
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum PointField {
             $( #[doc = concat!("`", $name, "` of [`FIELDS`](crate::deck::fields::FIELDS)")] $variant, )*
-            /// A state variable of a material; zero at points whose material has none of the name.
+            /// A state variable of a material; zero where a point's material does not have it.
             State(StateVariable),
         }
 

@@ -20,7 +20,7 @@ pub struct Mark {
     pub step: usize,
 }
 
-/// Written by rank 0; the other ranks only learn the outcome.
+/// Written by rank 0; the other ranks get the outcome.
 #[derive(Debug)]
 pub struct CsvTable {
     path: PathBuf,

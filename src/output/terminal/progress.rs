@@ -55,7 +55,7 @@ pub struct Progress {
     last_line: Option<f64>,
     last_change: f64,
     /// Step and s of the last line anywhere.
-    told: Option<(usize, f64)>,
+    last_report: Option<(usize, f64)>,
     headed: bool,
 }
 
@@ -68,7 +68,7 @@ impl Progress {
             started: Some((share, elapsed)),
             last_line: None,
             last_change: 0.0,
-            told: None,
+            last_report: None,
             headed: false,
         }
     }
@@ -92,7 +92,7 @@ impl Progress {
         if due {
             log.note(&line);
             self.last_due = Some(report.elapsed);
-            self.told = Some((report.step, report.elapsed));
+            self.last_report = Some((report.step, report.elapsed));
         }
         let quiet_for = report.elapsed - self.last_line.unwrap_or(f64::NEG_INFINITY);
         if due && (!log.on_terminal() || quiet_for >= LINE_EVERY || report.last) {
@@ -108,7 +108,7 @@ impl Progress {
     /// Steps a second since the last line of the log.
     fn rate(&self, report: &StepReport) -> Option<f64> {
         let start = self.started.map_or(0.0, |(_, elapsed)| elapsed);
-        let (step, elapsed) = self.told.unwrap_or((report.step.saturating_sub(1), start));
+        let (step, elapsed) = self.last_report.unwrap_or((report.step.saturating_sub(1), start));
         let rate = report.step.saturating_sub(step) as f64 / (report.elapsed - elapsed);
         (rate.is_finite() && rate > 0.0).then_some(rate)
     }
@@ -207,10 +207,10 @@ mod tests {
         let mut progress = Progress::new(Interval::Steps(1), 0.0, 2.0);
         let report = StepReport { step: 11, elapsed: 2.25, ..Default::default() };
         assert_eq!(progress.rate(&report), Some(4.0), "one step since the start");
-        progress.told = Some((11, 2.25));
+        progress.last_report = Some((11, 2.25));
         let report = StepReport { step: 21, elapsed: 3.25, ..Default::default() };
         assert_eq!(progress.rate(&report), Some(10.0));
-        progress.told = Some((21, 3.25));
+        progress.last_report = Some((21, 3.25));
         assert_eq!(progress.rate(&report), None, "no time has passed");
     }
 
