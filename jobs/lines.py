@@ -57,7 +57,7 @@ NEW_SUBJECTS = {
         "record/probes.rs", "deck/sections/probes.rs"],
     "help with decks: --new, --list, --explain, --schema, warnings of the plan": [
         "deck/templates.rs", "deck/list.rs", "deck/explain.rs", "deck/json_schema.rs",
-        "run/aside.rs", "run/plan_checks.rs", "run/thin.rs", "run/start_checks/contest.rs"],
+        "run/aside.rs", "run/plan_checks.rs", "run/thin.rs", "run/lengths.rs", "run/start_checks/contest.rs"],
     "libraries of other make: BLAS kernels, factors, serial HDF5, launchers": [
         "petsc/blas.rs", "petsc/factors.rs", "parallel/launcher.rs"],
 }
@@ -67,10 +67,19 @@ def git(*words):
     return subprocess.run(["git", *words], check=True, capture_output=True, text=True).stdout
 
 
-def counts(path, text):
-    """Code, comment, blank and test lines of a file."""
+def test_files(files):
+    """Files that are modules of tests; files: path to text."""
+    declared = re.compile(r"#\[cfg\(test\)\]\n(?:pub\(\w+\) )?mod (\w+);")
+    found = {path for path in files if path.endswith("tests.rs") or "/tests/" in path}
+    for path, text in files.items():
+        folder = path.rpartition("/")[0] if path.endswith("/mod.rs") else path.removesuffix(".rs")
+        found |= {f"{folder}/{name}.rs".removeprefix("lib/") for name in declared.findall(text)}
+    return found
+
+
+def counts(text, tests):
+    """Code, comment, blank and test lines of a file; tests: it is a module of tests."""
     lines, of = text.splitlines(), Counter()
-    tests = path.endswith("tests.rs") or "/tests/" in path
     marked = False
     for line in lines:
         word = line.strip()
@@ -98,15 +107,35 @@ def subject(path):
 
 
 def survey(revision):
-    folders, subjects = defaultdict(Counter), defaultdict(Counter)
-    for file in git("ls-tree", "-r", "--name-only", revision, "src").split():
-        if not file.endswith(".rs"):
-            continue
-        path = file.removeprefix("src/")
-        of = counts(path, git("show", f"{revision}:{file}"))
-        folders[path.split("/")[0] if "/" in path else "(top)"].update(of)
+    folders, subjects, old = defaultdict(Counter), defaultdict(Counter), defaultdict(Counter)
+    names = git("ls-tree", "-r", "--name-only", revision, "src").split()
+    files = {
+        name.removeprefix("src/"): git("show", f"{revision}:{name}")
+        for name in names if name.endswith(".rs")}
+    tests = test_files(files)
+    for path, text in files.items():
+        of = counts(text, path in tests)
+        folder = path.split("/")[0] if "/" in path else "(top)"
+        folders[folder].update(of)
         subjects[subject(path)].update(of)
-    return folders, subjects
+        if subject(path) is None:
+            old[folder].update(of)
+    return folders, subjects, old
+
+
+# Parts that do what they did at OLD: folders then and now, without the files of new subjects.
+PARTS = [
+    ("solvers", ["petsc", "multigrid"], ["petsc", "amg", "blocks"]),
+    ("grid", ["grid"], ["grid"]),
+    ("ghost, tensor", ["ghost", "tensor"], ["ghost", "tensor"]),
+    ("parallel", ["parallel"], ["parallel"]),
+    ("basis, mechanics, material", *[["basis", "mechanics", "material"]] * 2),
+    ("points", ["points"], ["points"]),
+    ("equations, steps, records", ["analysis", "assembly"],
+     ["analysis", "system", "mass", "transfer", "loads", "record", "run"]),
+    ("output", ["output"], ["output"]),
+    ("deck, command line", ["deck", "(top)"], ["deck", "(top)"]),
+]
 
 
 def cells(of):
@@ -120,7 +149,7 @@ def total(table):
 
 def main():
     old, new = (sys.argv[1:] + ["1571419", "HEAD"][len(sys.argv) - 1:])[:2]
-    (before, _), (after, subjects) = survey(old), survey(new)
+    (before, _, then), (after, subjects, now) = survey(old), survey(new)
     print("| folder | lines then | code | comments | tests | lines now | code | comments | tests |")
     print("|---|---|---|---|---|---|---|---|---|")
     for folder in sorted(set(before) | set(after)):
@@ -132,7 +161,12 @@ def main():
     fresh = total({name: of for name, of in subjects.items() if name})
     print(f"| all of them | {cells(fresh)} |")
     print(f"| files of subjects that were there | {cells(subjects[None])} |")
-    print(f"| {old}, all files | {cells(total(before))} |")
+    print(f"| {old}, all files | {cells(total(before))} |\n")
+    print("| part, without new subjects | lines then | code then | lines now | code now |\n|---|---|---|---|---|")
+    for name, folders_then, folders_now in PARTS:
+        pair = [sum((table[f] for f in folders), Counter())
+                for table, folders in [(then, folders_then), (now, folders_now)]]
+        print(f"| {name} | " + " | ".join(f"{sum(of.values())} | {of['code']}" for of in pair) + " |")
 
 
 if __name__ == "__main__":
