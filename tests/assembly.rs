@@ -212,6 +212,7 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
         tolerance: 1e-9,
         max_evaluations: 10,
         inverted: deck.analysis.inverted_iterates,
+        ends_where_stalled: false,
     };
     let external = vec![0.0; owned];
     let grid = &model.grid;

@@ -19,6 +19,19 @@ pub(crate) fn hardly_falls(errors: &[f64]) -> bool {
     !before.is_empty() && *last > 0.1 * least
 }
 
+/// The least of the last errors is hardly below the least before them. Iterates that go to and fro between parts of a
+/// piecewise smooth problem (contact that closes and opens, slip to either side) do so for ever with full steps.
+pub(crate) fn stalls(errors: &[f64]) -> bool {
+    let Some(earlier) = errors.len().checked_sub(STALLED) else { return false };
+    let least = |errors: &[f64]| errors.iter().fold(f64::INFINITY, |a, &b| a.min(b));
+    earlier >= BEFORE && least(&errors[earlier..]) > 0.9 * least(&errors[..earlier])
+}
+
+/// Errors that have to stay.
+const STALLED: usize = 9;
+/// Errors before them.
+const BEFORE: usize = 3;
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -47,5 +60,22 @@ mod tests {
         // Too few, or not numbers.
         assert!(!hardly_falls(&[1e-9]));
         assert!(!hardly_falls(&[1e-9, 1e-9, f64::NAN]));
+    }
+
+    #[test]
+    fn errors_that_stall() {
+        // Iterates that go round in five, and in two with a drift.
+        let mut errors = vec![1.9, 0.47, 0.5];
+        for k in 0..9 {
+            errors.push([0.51, 0.61, 0.508, 0.521, 0.637][k % 5]);
+        }
+        assert!(stalls(&errors));
+        assert!(!stalls(&errors[..errors.len() - 1]));
+        let drifts = (0..12).map(|k| 0.0394 + 0.0066 * f64::from(k % 2) - 1e-5 * f64::from(k));
+        assert!(stalls(&drifts.collect::<Vec<_>>()));
+        // A slow fall, and a late one.
+        let slow: Vec<f64> = (0..40).map(|k| 0.98f64.powi(k)).collect();
+        assert!(!stalls(&slow));
+        assert!(!stalls(&[1.0, 0.5, 0.4, 0.6, 0.7, 0.5, 0.6, 0.5, 0.6, 0.5, 1e-2, 1e-4]));
     }
 }

@@ -50,6 +50,7 @@ pub(crate) fn settings<const D: usize>(model: &Model<D>) -> NewtonSettings {
         tolerance: analysis.tolerance,
         max_evaluations: analysis.max_iterations,
         inverted: analysis.inverted_iterates,
+        ends_where_stalled: !model.contacts.is_empty() || !model.facing.is_empty(),
     }
 }
 
@@ -90,7 +91,7 @@ impl<'a, const D: usize, const N: usize> System<'a, D, N> {
         let System { mut equations, mut matrix, size } = self;
         let mut solution = matrix.vector()?;
         let (begin, waited) = (Instant::now(), traffic::so_far().waited);
-        let (outcome, stronger) =
+        let (outcome, used) =
             solve_robustly(world, &mut equations, size, trials, &mut matrix, &mut solution)?;
         let (seconds, waited) = (begin.elapsed().as_secs_f64(), traffic::so_far().waited - waited);
         let end = if outcome.converged {
@@ -111,7 +112,7 @@ impl<'a, const D: usize, const N: usize> System<'a, D, N> {
         };
         Ok(Attempt {
             end,
-            stronger,
+            used: used.filter(|_| outcome.converged),
             most_linear_iterations: outcome.linear_iterations_max,
             at_round_off: equations.at_round_off,
             seconds,
@@ -130,8 +131,8 @@ pub struct Attempt {
     pub errors: Vec<f64>,
     /// Most iterations of one linear solve.
     pub most_linear_iterations: usize,
-    /// The solver that solved what multigrid could not.
-    stronger: Option<String>,
+    /// What solved the step where the first way did not, and why that did not.
+    used: Option<String>,
     /// The last residual is above the tolerance, and all of it round-off.
     at_round_off: bool,
     /// Wall time of all, of the evaluations in it, and of waiting for other ranks outside PETSc, s.
@@ -149,9 +150,8 @@ impl Attempt {
         clock: &mut Clock,
         number: usize,
     ) -> std::result::Result<Converged, Halt> {
-        if let Some(solver) = self.stronger {
-            let text = format!("step {number}: multigrid failed; solved again with {solver}");
-            recorder.log.say(&text);
+        if let Some(used) = self.used {
+            recorder.log.say(&format!("step {number}: {used}"));
         }
         clock.add(Phase::Assemble, self.assembly_seconds);
         // What the program waited for other ranks while the solver ran is time of the assembly, not busy. PETSc
@@ -212,8 +212,9 @@ struct Size {
     null_pivots: bool,
 }
 
-/// Newton's method with the default solver; where that fails, once more from the start with the
-/// next stronger one, which is named. Collective.
+/// Newton's method with the default solver; where its iterates come no closer, again from the start with narrower
+/// line searches; where the linear solver fails, once more with the next stronger one. What solved a step at last is
+/// named. Collective.
 fn solve_robustly<const D: usize, const N: usize>(
     world: &World,
     problem: &mut Equilibrium<'_, D, N>,
@@ -222,12 +223,23 @@ fn solve_robustly<const D: usize, const N: usize>(
     matrix: &mut Matrix,
     solution: &mut Vector,
 ) -> Result<(NewtonOutcome, Option<String>)> {
-    let Size { shape, equations, stabilised, null_pivots } = size;
+    let Size { mut shape, equations, stabilised, null_pivots } = size;
     let linear = Linear::of::<D>(equations, stabilised, trials)?;
     let most = problem.settings().max_evaluations;
     let mut snes = solver::newton(world, linear, shape, null_pivots, most)?;
-    let outcome = snes.solve(problem, matrix, solution)?;
-    trials.note(linear, !outcome.converged);
+    let mut outcome = snes.solve(problem, matrix, solution)?;
+    trials.note(linear, !outcome.converged && !problem.stalled);
+    if problem.stalled {
+        while let Some(narrower) = shape.search.narrower().filter(|_| !outcome.converged) {
+            shape.search = narrower;
+            snes = solver::newton(world, linear, shape, null_pivots, most)?;
+            problem.restart();
+            solution.values_mut()?.fill(0.0);
+            outcome = snes.solve(problem, matrix, solution)?;
+        }
+        let words = format!("the iterates came no closer; solved again with {}", shape.search.words());
+        return Ok((outcome, Some(words)));
+    }
     let stronger = linear.stronger::<D>(equations, outcome.linear_failure);
     let Some(stronger) = stronger.filter(|_| !outcome.converged) else {
         return Ok((outcome, None));
@@ -241,5 +253,6 @@ fn solve_robustly<const D: usize, const N: usize>(
     }
     problem.restart();
     solution.values_mut()?.fill(0.0);
-    Ok((snes.solve(problem, matrix, solution)?, Some(after)))
+    let used = format!("multigrid failed; solved again with {after}");
+    Ok((snes.solve(problem, matrix, solution)?, Some(used)))
 }

@@ -182,10 +182,51 @@ pub struct Shape {
     pub levels: bool,
     /// The tangent equals its transposed.
     pub symmetric: bool,
-    /// A line search follows each solve. Not for F-bar alone: the volume of an iterate is off by the
-    /// square of its rotation, a bulk modulus times which may be a hundred times the loads, and full
-    /// steps are past that in one iteration.
-    pub search: bool,
+    /// How far each of its iterations goes.
+    pub search: Search,
+}
+
+/// How far an iteration goes along its direction.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Search {
+    /// To its end.
+    None,
+    /// Back from where the residual grows beyond measure.
+    Wide,
+    /// To where the residual has no share along the direction, by one secant.
+    Root,
+    /// Back until the residual falls.
+    Falling,
+}
+
+impl Search {
+    /// How to solve a step once more whose iterates came no closer with this one.
+    pub fn narrower(self) -> Option<Self> {
+        match self {
+            Search::None | Search::Wide => Some(Search::Root),
+            Search::Root => Some(Search::Falling),
+            Search::Falling => None,
+        }
+    }
+
+    /// In the words of a log.
+    pub fn words(self) -> &'static str {
+        match self {
+            Search::None => "full steps",
+            Search::Wide => "a wide line search",
+            Search::Root => "steps to the root along each direction",
+            Search::Falling => "steps along which the residual falls",
+        }
+    }
+
+    fn options(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Search::None => &[],
+            Search::Wide => &[("snes_linesearch_type", "bt"), ("snes_linesearch_alpha", GROWTH)],
+            Search::Root => &[("snes_linesearch_type", "cp")],
+            Search::Falling => &[("snes_linesearch_type", "bt"), ("snes_linesearch_alpha", "1e-4")],
+        }
+    }
 }
 
 impl Shape {
@@ -199,7 +240,10 @@ impl Shape {
         let mild = deck.method.locking == Locking::FBar
             && deck.analysis.tangent == Tangent::Auto
             && model.symmetric;
-        Shape { levels: amg::serves(&unknowns), symmetric, search: !symmetric && !mild }
+        // Not for F-bar alone: the volume of an iterate is off by the square of its rotation, a bulk modulus times
+        // which may be a hundred times the loads, and full steps are past that in one iteration.
+        let search = if symmetric || mild { Search::None } else { Search::Wide };
+        Shape { levels: amg::serves(&unknowns), symmetric, search }
     }
 }
 
@@ -237,10 +281,8 @@ fn newton_under(
         set(&mut defaults, "pc_type", "gamg");
         set(&mut defaults, "snes_lag_preconditioner", "1");
     }
-    if shape.search {
-        defaults.push(("snes_linesearch_type", "bt".into()));
-        defaults.push(("snes_linesearch_alpha", GROWTH.into()));
-    }
+    let search = shape.search.options().iter();
+    defaults.extend(search.map(|(name, value)| (*name, (*value).to_string())));
     if !factors(prefix)? {
         // MUMPS has no others than those of LU and Cholesky.
         defaults.retain(|(name, _)| *name != "pc_factor_mat_solver_type");

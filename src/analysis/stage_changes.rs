@@ -10,6 +10,7 @@ use crate::record::context::Run;
 use crate::record::ledger::{Entry, StepSums};
 use crate::system::apart::require_apart;
 use crate::system::conditions::StepSpan;
+use crate::system::holds;
 use crate::transfer::{affine, update};
 
 /// Brings the points to what the stage of a step holds; returns the energy that came with bodies
@@ -40,6 +41,7 @@ pub fn enter<const D: usize>(run: &mut Run<D>, span: StepSpan) -> Result<f64> {
         }
     }
     if begins && stage > 0 {
+        holds::take(&run.model, &mut run.points, stage);
         require_apart(run.world, &run.model, &run.points, span.start())?;
     }
     Ok(gained)

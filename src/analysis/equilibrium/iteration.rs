@@ -2,7 +2,7 @@
 
 use crate::amg::level::Assembled;
 use crate::amg::{self, BlockSmoother, Hierarchy, Levelled, Levels};
-use crate::analysis::convergence::{converges_next, hardly_falls};
+use crate::analysis::convergence::{converges_next, hardly_falls, stalls};
 use crate::blocks::BlockProduct;
 use crate::error::Result;
 use crate::petsc::Ksp;
@@ -76,6 +76,12 @@ impl<const D: usize, const N: usize> NewtonProblem for Equilibrium<'_, D, N> {
         } else if iteration > 0 && (hardly_falls(&self.errors) || last) && self.is_round_off()? {
             self.at_round_off = true;
             Verdict::Converged
+        } else if self.settings.ends_where_stalled && stalls(&self.errors) {
+            self.stalled = true;
+            Verdict::Diverged(format!(
+                "the iterates come no closer, residual {error:.3e} after {} evaluations",
+                iteration + 1
+            ))
         } else if last {
             Verdict::Diverged(format!(
                 "residual {error:.3e} after {} evaluations, tolerance {:.1e}",

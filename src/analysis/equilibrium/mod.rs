@@ -38,6 +38,8 @@ pub struct NewtonSettings {
     pub max_evaluations: usize,
     /// What happens to an iterate with det dF <= 0.
     pub inverted: InvertedIterates,
+    /// The iteration ends where its errors stay, for a narrower line search to begin again.
+    pub ends_where_stalled: bool,
 }
 
 /// What a step's equations of `N` unknowns per node consist of.
@@ -100,6 +102,8 @@ pub struct Equilibrium<'a, const D: usize, const N: usize = D> {
     actions_norm: f64,
     /// The step ends above the tolerance, at the round-off of its equations.
     pub at_round_off: bool,
+    /// The last solve ended because its iterates came no closer. The same on all ranks.
+    pub stalled: bool,
     /// Health of the last evaluation on this rank.
     pub health: Health,
     /// Wall time of all evaluations, s.
@@ -205,6 +209,7 @@ impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
             residual_norm: 0.0,
             actions_norm: 0.0,
             at_round_off: false,
+            stalled: false,
             health: Health::default(),
         }
     }
@@ -231,6 +236,7 @@ impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
         }
         self.diagonal_scale = 0.0;
         self.errors.clear();
+        self.stalled = false;
     }
 
     /// Increments of the unknowns at the last evaluation, local nodes.
