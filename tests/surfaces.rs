@@ -227,6 +227,83 @@ fn surfaces_go_with_their_points_over_ranks_and_restarts() {
     }
 }
 
+/// A bar under a traction on its top, which a support of the second stage holds while the traction goes.
+const PROPPED: &str = r#"
+[analysis]
+type = "quasi-static"
+tolerance = 1e-12
+[[stage]]
+name = "loaded"
+steps = 2
+[[stage]]
+name = "propped"
+steps = 4
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+origin = [-0.5, -0.5]
+size = [2.0, 2.0]
+h = 0.25
+[material.m]
+model = "hencky"
+young = 1e6
+poisson = 0.0
+[[body]]
+name = "bar"
+material = "m"
+shape = { box = { min = [0.1, 0.07], max = [1.1, 1.07] } }
+[[boundary]]
+name = "foot"
+surface = { side = "bottom" }
+[[boundary]]
+name = "prop"
+surface = { side = "top" }
+from = "propped"
+[[load]]
+traction = { side = "top", value = [0.0, -100.0] }
+until = "propped"
+[output]
+checkpoint = { every = 1, keep = 9 }
+"#;
+
+/// A support of a later stage holds its surface where it was as that stage began: it bears what the traction bore,
+/// less what its penalty gives way; a displacement counts from there. A restart knows the place.
+#[test]
+fn a_support_of_a_later_stage_holds_what_it_finds() {
+    let (young, pressure, gives_way) = (1e6, 100.0, 0.25 / (100.0 * 1e6));
+    // The way of the top under the traction: the bar's and that of the foot's penalty.
+    let compliance = 1.0 / young + gives_way;
+    let found = pressure * compliance;
+    for driven in [0.0, -0.7e-4] {
+        let results = Run::text(PROPPED).set(format!("boundary.1.displacement={{y={driven}}}"));
+        let results = results.results();
+        let force = results.history("reaction.prop.y");
+        assert_eq!(force[1], 0.0, "nothing is there before");
+        let expected = -(found - driven) / (compliance + gives_way);
+        let last = force[force.len() - 1];
+        assert!((last / expected - 1.0).abs() < 1e-3, "{driven}: {last} {expected}");
+        // Until the traction has gone the foot bears both.
+        let foot = results.history("reaction.foot.y");
+        assert!((foot[3] + force[3] - 0.5 * pressure).abs() < 1e-6 * pressure, "{foot:?}");
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let deck = folder.path().join("deck.toml");
+    std::fs::write(&deck, PROPPED).expect("a deck");
+    let at = |name: &str| folder.path().join(name);
+    run_well(1, &deck, &at("one"), &[]);
+    run_well(2, &deck, &at("two"), &[]);
+    let end = |name: &str| points_of(&at(name).join("checkpoint-000006.h5"));
+    let (error, field) = difference(&end("one"), &end("two"));
+    assert!(error < 1e-8, "{field} differs by {error:e}");
+    for (name, step) in [("begin", 2), ("middle", 4)] {
+        let from = at("two").join(format!("checkpoint-00000{step}.h5")).display().to_string();
+        run_well(2, &deck, &at(name), &["--restart", &from]);
+        let (error, field) = difference(&end("two"), &end(name));
+        assert!(error == 0.0, "{name}: {field} differs by {error:e}");
+    }
+}
+
 /// Driven by its surfaces alone: the lower side of a column is held, the upper one pressed down. With
 /// the gap p h / (penalty E) at either end, -E ln(l) / l = p.
 #[test]

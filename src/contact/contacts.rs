@@ -16,6 +16,7 @@ use super::told;
 use super::triangles::Triangles;
 use crate::basis::Domain;
 use crate::deck::model::{self, AnalysisType, Basis, Partner, RigidShape, Symmetry};
+use crate::deck::stage::begin_of;
 use crate::deck::{self, Deck, Presence};
 use crate::error::{Error, Result};
 
@@ -277,8 +278,7 @@ fn rigid<const D: usize>(deck: &Deck, index: usize, rigid: &model::Rigid) -> Res
     };
     let motion = Motion(rigid.motion.clone());
     let presence = rigid.presence;
-    let before = deck.stages.iter().take(presence.from.unwrap_or(0));
-    let since = before.map(|stage| stage.duration.unwrap_or(1.0)).sum();
+    let since = begin_of(&deck.stages, presence.from.unwrap_or(0));
     Ok(Rigid { name: rigid.name.clone(), surface, motion, free, presence, since })
 }
 

@@ -55,11 +55,12 @@ pub fn tell<const D: usize>(
         return;
     }
     let words = D + OTHERS.len();
+    let first = |names: &Vec<String>| names.iter().position(|name| name == FORCE[0]);
+    let first: Vec<Option<usize>> = points.slip.names().iter().map(first).collect();
     for p in 0..points.len() {
         let body = points.body[p];
-        let row = points.slip.of_mut(p, body);
-        if !row.is_empty() {
-            let own = row.len() - words;
+        if let Some(own) = first[body as usize] {
+            let row = points.slip.of_mut(p, body);
             row[own..own + D + 1].fill(0.0);
             row[own + words - 1] = 0.0;
         }
@@ -67,9 +68,8 @@ pub fn tell<const D: usize>(
     let mut slid = vec![0.0f64; points.len()];
     for one in told {
         let body = points.body[one.point];
-        let row = points.slip.of_mut(one.point, body);
-        let Some(own) = row.len().checked_sub(words) else { continue };
-        let row = &mut row[own..];
+        let Some(own) = first[body as usize] else { continue };
+        let row = &mut points.slip.of_mut(one.point, body)[own..own + words];
         for (sum, force) in row.iter_mut().zip(&one.force) {
             *sum += force;
         }

@@ -16,6 +16,11 @@ pub struct Stage {
     pub reset_displacement: bool,
 }
 
+/// t as a stage begins, s; without time the stages before count as one second each.
+pub fn begin_of(stages: &[Stage], stage: usize) -> f64 {
+    stages.iter().take(stage).map(|stage| stage.duration.unwrap_or(1.0)).sum()
+}
+
 /// A moment of the analysis: the stage (from zero), s in it, and the time over all stages, s.
 /// Without time the stages before count as one second each.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -91,7 +91,7 @@ pub fn supports<const D: usize>(
                 (surface, wanted.slip.then_some(sheet))
             }
         };
-        supports.extend(Support::new((index, boundary), surface, within, cell));
+        supports.extend(Support::new((index, boundary), surface, within, (cell, &deck.stages)));
     }
     Ok(supports)
 }

@@ -35,6 +35,7 @@ pub(crate) mod face_points;
 pub(crate) mod facing;
 pub(crate) mod graph;
 pub mod held;
+pub(crate) mod holds;
 pub mod in_place;
 pub(crate) mod kernel;
 pub mod model;

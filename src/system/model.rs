@@ -16,6 +16,7 @@ use crate::parallel::{Partition, World};
 use crate::points::Points;
 use crate::surface::Surface;
 
+use super::holds;
 use super::supports::Support;
 
 /// What stays the same while points move: the deck made computable.
@@ -61,11 +62,15 @@ impl<const D: usize> Model<D> {
         !self.supports.is_empty() || self.loads.iter().any(|load| load.on_surface().is_some())
     }
 
-    /// Names of the words of contacts that the points of each body carry.
+    /// Names of the words of contacts, and of supports of later stages, that the points of each body carry.
     pub fn slip_names(&self) -> Vec<Vec<String>> {
         let carried: Vec<usize> =
             (0..self.deck.bodies.len()).map(|body| self.most_carried(body)).collect();
-        self.contacts.slip_names(&self.deck, &carried)
+        let mut names = self.contacts.slip_names(&self.deck, &carried);
+        for (body, names) in names.iter_mut().enumerate() {
+            names.extend(holds::names(self, body));
+        }
+        names
     }
 
     /// First word of the elastic slip of an element that a point of a body carries, in contact with another

@@ -1,10 +1,11 @@
-//! Surfaces that are held where they were at the start, or driven, by a penalty (formulations.md
+//! Surfaces that are held where they were at the start, or as their stage began ([`super::holds`]), or driven, by a penalty (formulations.md
 //! B.6 (a)): the force on an element of the area A is -β A P (x_s - X_s - ū), with P the unit tensor,
 //! chosen components or n ⊗ n, and β = penalty E / h.
 
 use crate::deck::Scope;
 use crate::deck::expression::Expression;
 use crate::deck::model::{Boundary, SupportMethod};
+use crate::deck::stage::{Stage, begin_of};
 use crate::loads::Moment;
 use crate::surface::sheet::Sheet;
 use crate::surface::{Element, Surface, norm};
@@ -31,17 +32,21 @@ pub struct Support<const D: usize> {
     displacement: Vec<(usize, Expression)>,
     /// What lies beyond it is free.
     pub within: Option<Sheet<D>>,
+    /// The later stage that it comes with, and t as that begins, s.
+    pub comes: Option<(usize, f64)>,
 }
 
 impl<const D: usize> Support<D> {
-    /// `cell`: size of the grid's cells, m. `None` for a boundary that holds nodes.
+    /// `cell`: size of the grid's cells, m; `stages` of the deck. `None` for a boundary that holds nodes.
     pub fn new(
         (index, boundary): (usize, &Boundary),
         surface: Surface<D>,
         within: Option<Sheet<D>>,
-        cell: f64,
+        (cell, stages): (f64, &[Stage]),
     ) -> Option<Self> {
         let support = boundary.support()?;
+        let from = boundary.presence.from.filter(|from| *from > 0);
+        let comes = from.map(|from| (from, begin_of(stages, from)));
         let mut components = [boundary.fix.is_empty() && boundary.displacement.is_empty(); D];
         let driven = boundary.displacement.iter().map(|(axis, _)| *axis);
         boundary.fix.iter().copied().chain(driven).for_each(|axis| components[axis] = true);
@@ -54,6 +59,7 @@ impl<const D: usize> Support<D> {
             nitsche: support.method == SupportMethod::Nitsche,
             displacement: boundary.displacement.clone(),
             within,
+            comes,
         })
     }
 
@@ -72,7 +78,7 @@ impl<const D: usize> Support<D> {
     }
 
     /// ū at an element, m: a value that holds neither s nor t is reached linearly with the load
-    /// factor, one that does counts from the start.
+    /// factor, one that does counts from the start, or from that of the stage it comes with.
     pub fn prescribed(&self, element: &Element<D>, at: Moment) -> [f64; D] {
         let mut u = [0.0; D];
         for (axis, expression) in &self.displacement {
@@ -83,16 +89,16 @@ impl<const D: usize> Support<D> {
             };
             let now = value(at.load_factor, at.time);
             u[*axis] = match expression.depends_on_time() {
-                true => now - value(0.0, 0.0),
+                true => now - value(0.0, self.comes.map_or(0.0, |(_, since)| since)),
                 false => now * at.load_factor,
             };
         }
         u
     }
 
-    /// Where an element has to be, m.
-    pub fn target(&self, element: &Element<D>, at: Moment) -> [f64; D] {
+    /// Where an element has to be, m, that was `held` there.
+    pub fn target(&self, element: &Element<D>, held: &Element<D>, at: Moment) -> [f64; D] {
         let u = self.prescribed(element, at);
-        std::array::from_fn(|i| element.place[i] + u[i])
+        std::array::from_fn(|i| held.place[i] + u[i])
     }
 }

@@ -214,7 +214,7 @@ pub const SECTIONS: &[Section] = &[
     Section {
         name: "surface",
         header: "boundary.surface",
-        doc: "A part of a body's own surface, which moves with it and is held where it was at the start; or the material that lies on a line (2D) or plane (3D) at the start. With slip, what has slid beyond the ends of a line or plane is free, and what has slid onto it is held.",
+        doc: "A part of a body's own surface, which moves with it and is held where it was at the start, or as the stage of `from` began; or the material that lies on a line (2D) or plane (3D) at the start. With slip, what has slid beyond the ends of a line or plane is free, and what has slid onto it is held.",
         keys: &[
             OF_BODY[0],
             OF_BODY[1],

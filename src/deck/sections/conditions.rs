@@ -3,7 +3,7 @@
 use super::bodies::EarlierSections;
 use super::{shapes, stages, surfaces};
 use crate::deck::model::{
-    AnalysisType, Body, Boundary, Grid, Load, MeshGrid, MeshSource, Place, Rotation, Support,
+    AnalysisType, Body, Boundary, Grid, Held, Load, MeshGrid, MeshSource, Place, Rotation, Support,
     SupportMethod, Water,
 };
 use crate::deck::problems::Got;
@@ -62,9 +62,10 @@ pub fn boundaries(
             if support.slip {
                 table.refuse(&["fix"], "slip holds the normal component already")?;
             }
-            if presence.from.is_some_and(|from| from > 0) {
-                let what = "a surface is held where it was at the start, from the first stage on";
-                let help = "hold grid nodes: where = { ... }";
+            let later = presence.from.is_some_and(|from| from > 0);
+            if later && matches!(support.surface, Held::Sheet(_)) {
+                let what = "what lies on a line or plane is found at the start of the run";
+                let help = "hold the surface of a body: surface = { body = ..., side = ... }";
                 return Err(table.problem_with_help("from", what, help));
             }
             return checked(

@@ -23,6 +23,7 @@ use crate::loads::pressure::{Pressure, PressureAt};
 use crate::loads::{Moment, OnSurface, shares_of_bodies};
 use crate::points::Points;
 use crate::surface::{Carried, Element, norm};
+use crate::system::holds;
 use crate::system::model::Model;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockRows;
@@ -61,8 +62,8 @@ struct Act<'a, const D: usize> {
 enum Kind<'a, const D: usize> {
     Traction(&'a [Expression]),
     Pressure(&'a Pressure),
-    /// With β, Pa/m.
-    Held(&'a Support<D>, f64),
+    /// With β, Pa/m, and where it is held.
+    Held(&'a Support<D>, f64, Element<D>),
 }
 
 /// Weights up to this are those of round-off.
@@ -116,6 +117,9 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
             Some((load, at, shares_of_bodies(deck, presence, when)))
         });
         let loads: Vec<_> = loads.collect();
+        let supports = model.supports.iter();
+        let supports: Vec<_> =
+            supports.map(|support| (support, holds::first_word(model, points, support))).collect();
         for &p in carriers {
             let id = points.id[p];
             for (load, at, shares) in &loads {
@@ -137,17 +141,18 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                     }
                 }
             }
-            for support in &model.supports {
+            for &(support, first) in &supports {
                 let presence = deck.boundaries[support.boundary].presence;
                 if !presence.holds_in(when.stage) {
                     continue;
                 }
                 let at = Moment::new(deck.analysis.kind, presence, when);
                 let stiffness = support.penalty * model.stiffness[points.body[p] as usize];
-                for own in support.surface.carried_by(id) {
+                for (element, own) in support.surface.carried_by(id).iter().enumerate() {
                     let place = place_of(points, p, own);
                     if support.within.as_ref().is_none_or(|sheet| sheet.holds(&place)) {
-                        term.push(step, p, own, (Kind::Held(support, stiffness), at));
+                        let held = holds::held(points, p, own, (first, element));
+                        term.push(step, p, own, (Kind::Held(support, stiffness, held), at));
                     }
                 }
             }
@@ -264,7 +269,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
         let mut borne = vec![Borne::default(); boundaries];
         let mut last = vec![usize::MAX; boundaries];
         for act in &self.acts {
-            let Kind::Held(support, _) = act.kind else { continue };
+            let Kind::Held(support, ..) = act.kind else { continue };
             let nodes = step.nodes_of_group(act.group);
             let f = self.push_on(act, step, nodes, displacement, &mut []);
             let x = self.moved(act.place, act, nodes, displacement);
@@ -282,9 +287,9 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
     /// Adds the stiffness by which supports hold local nodes, this rank's share, N/m.
     pub fn add_penalties(&self, step: StepPoints<'_, D>, stiffness: &mut [f64]) {
         for act in &self.acts {
-            let Kind::Held(_, penalty) = act.kind else { continue };
+            let Kind::Held(_, penalty, held) = act.kind else { continue };
             let nodes = step.nodes_of_group(act.group);
-            let of_area = penalty * norm(&act.element.area);
+            let of_area = penalty * norm(&held.area);
             for (&node, w) in nodes.iter().zip(self.weights_of(act, nodes)) {
                 stiffness[node as usize] += of_area * w * w;
             }
@@ -328,13 +333,13 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                 let area = norm(&act.element.area);
                 traction.map(|t| t * area)
             }
-            Kind::Held(support, stiffness) => {
+            Kind::Held(support, stiffness, held) => {
                 // Apart from the place, in which small increments would lose their digits.
-                let target = support.target(act.element, act.at);
+                let target = support.target(act.element, &held, act.at);
                 let start = std::array::from_fn(|i| act.place[i] - target[i]);
                 let gap = self.moved(start, act, nodes, displacement);
-                let scale = stiffness * norm(&act.element.area);
-                let stiff = support.projection(act.element).map(|row| row.map(|p| scale * p));
+                let scale = stiffness * norm(&held.area);
+                let stiff = support.projection(&held).map(|row| row.map(|p| scale * p));
                 if !block.is_empty() {
                     let rows = weights.iter().map(|w| stiff.map(|row| row.map(|k| w * k)));
                     add_products::<D, _>(block, nodes.len(), rows, |b, of_a, i| {
@@ -352,7 +357,7 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
                         displacement,
                         wanted,
                     );
-                    let held = support.projection(act.element);
+                    let held = support.projection(&held);
                     let supplied = dense::apply(&held, &traction);
                     f.iter_mut().zip(supplied).for_each(|(f, t)| *f += t);
                     if wanted {
