@@ -155,6 +155,41 @@ fn newtons_method_converges_quadratically() {
     }
 }
 
+/// A plate meets a block at the end of the first step and pushes it; a disc is pressed into it. With full steps Newton's
+/// iterates go round between corners that stick, slip and part, at any size of step; narrower searches along them end, at
+/// the forces that smaller steps find.
+#[test]
+fn iterates_that_come_no_closer_are_solved_with_narrower_searches() {
+    let block = |shape: &str, motion: &str, law: &str| {
+        format!(
+            "[analysis]\ntype = \"quasi-static\"\nsteps = 3\nmax_iterations = 40\n\
+             [method]\nbasis = \"gimp\"\n\
+             [grid]\ntype = \"lattice\"\norigin = [-0.5, -0.5]\nsize = [2.0, 2.0]\nh = 0.125\n\
+             [material.m]\nmodel = \"hencky\"\nyoung = 1e6\npoisson = 0.3\n\
+             [[body]]\nname = \"b\"\nmaterial = \"m\"\n\
+             shape = {{ box = {{ min = [0.0, 0.0], max = [1.0, 0.5] }} }}\n\
+             [[boundary]]\nwhere = {{ box = {{ min = [0.0, 0.0], max = [1.0, 0.0] }} }}\n\
+             fix = [\"x\", \"y\"]\n\
+             [[rigid]]\nname = \"tool\"\nshape = {shape}\nmotion = {{ displacement = {motion} }}\n\
+             [[contact]]\nbetween = [\"tool\", \"b\"]\n{law}\n"
+        )
+    };
+    let plate = "{ half_space = { point = [0, 0.52], normal = [0, -1] } }";
+    let disc = "{ disc = { centre = [0.53, 0.93], radius = 0.4 } }";
+    for text in [
+        block(plate, "[0.05, -0.06]", "friction = 0.3\npenalty = 10.0"),
+        block(disc, "[0.0, -0.06]", "penalty = 100.0"),
+    ] {
+        let coarse = Run::text(&text).results();
+        let log = std::fs::read_to_string(coarse.directory.join("log.txt")).expect("a log");
+        assert!(log.contains("the iterates came no closer; solved again with steps"), "{log}");
+        let fine = Run::text(&text).set("analysis.steps=12").results();
+        let force = |results: &Results| last(results, "reaction.tool.y");
+        let apart = force(&coarse) / force(&fine) - 1.0;
+        assert!(apart.abs() < 0.01, "{} {}", force(&coarse), force(&fine));
+    }
+}
+
 /// The rank boundary goes through the block and the contact zones.
 /// A block that stands on a rigid plane between lines of the grid, smooth, rough and sliding: the linear
 /// iterations per solve rise by less than half from a penalty of 10 to one of 100, on any ranks.
@@ -586,8 +621,8 @@ fn a_free_disc_rolls() {
     assert!((way / expected - 1.0).abs() < 0.02, "{way} {expected}");
 }
 
-/// The tangent times a direction is the central difference of the force: on flat and curved surfaces
-/// and at corners of a polygon, in stick and slip, where contact begins in the step and where it was
+/// The tangent times a direction is the central difference of the force: on flat and curved surfaces, at corners of
+/// a polygon, beside the edge of a cone, and at edges and corners of triangles, in stick and slip, where contact begins in the step and where it was
 /// there before.
 fn tangents(universe: &Universe) {
     let world = World::new(universe.world().duplicate());
@@ -603,9 +638,57 @@ fn tangents(universe: &Universe) {
         }
     }
     let cone = "{ cone = { tip = [1.5, 1.45, 2.6], angle = 90, radius = 1.0, shaft = 1.0 } }";
-    for friction in ["0.0", "0.05", "\"rough\""] {
-        tangent::<3>(&world, "gimp", cone, friction);
+    let shoulder = "{ cone = { tip = [1.5, 1.45, 2.3], angle = 90, radius = 0.4, shaft = 1.0 } }";
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let file = folder.path().join("pit.stl");
+    std::fs::write(&file, pitted()).expect("an STL file");
+    let pit = format!("{{ stl = {:?} }}", file.display().to_string());
+    for shape in [cone, shoulder, &pit] {
+        for friction in ["0.0", "0.05", "\"rough\""] {
+            tangent::<3>(&world, "gimp", shape, friction);
+        }
     }
+}
+
+/// A block of triangles with a pit in its lower face: four edges and a corner that point inwards. Only such edges and
+/// corners are nearest to what lies inside. Corners of the domains come to facets, edges and the corner of the pit.
+fn pitted() -> String {
+    let at = |square: [f64; 2], z: f64| -> [[f64; 3]; 4] {
+        let [low, high] = square;
+        [[low, low, z], [high, low, z], [high, high, z], [low, high, z]]
+    };
+    let (outer, above, rim) = (at([0.0, 3.0], 2.6), at([0.0, 3.0], 4.0), at([1.35, 1.65], 2.6));
+    let (apex, middle) = ([1.5, 1.5, 2.9], [1.5, 1.5]);
+    let mut faces = vec![(above.to_vec(), [0.0, 0.0, 1.0])];
+    for k in 0..4 {
+        let next = (k + 1) % 4;
+        let out: [f64; 2] =
+            std::array::from_fn(|i| 0.5 * (outer[k][i] + outer[next][i]) - middle[i]);
+        faces.push((vec![outer[k], outer[next], above[next], above[k]], [out[0], out[1], 0.0]));
+        faces.push((vec![outer[k], outer[next], rim[next], rim[k]], [0.0, 0.0, -1.0]));
+        faces.push((vec![rim[k], rim[next], apex], [-out[0], -out[1], 0.0]));
+    }
+    let mut text = String::from("solid pit\n");
+    for (corners, out) in faces {
+        for k in 1..corners.len() - 1 {
+            let mut triangle = [corners[0], corners[k], corners[k + 1]];
+            let edge =
+                |k: usize| -> [f64; 3] { std::array::from_fn(|i| triangle[k][i] - triangle[0][i]) };
+            let (a, b) = (edge(1), edge(2));
+            let normal: [f64; 3] = std::array::from_fn(|i| {
+                a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]
+            });
+            if normal.iter().zip(out).map(|(n, o)| n * o).sum::<f64>() < 0.0 {
+                triangle.swap(1, 2);
+            }
+            text += "facet normal 0 0 0\nouter loop\n";
+            for [x, y, z] in triangle {
+                text += &format!("vertex {x} {y} {z}\n");
+            }
+            text += "endloop\nendfacet\n";
+        }
+    }
+    text + "endsolid pit\n"
 }
 
 fn tangent<const D: usize>(world: &World, basis: &str, shape: &str, friction: &str) {
@@ -742,17 +825,50 @@ fn a_cone_meets_its_resistance() {
     assert!((0.95 * 9.72..1.05 * 10.77).contains(&mean), "{mean}");
 }
 
-/// The same with five cells a radius over six radii: in the band over the last two radii, and near to steady.
+/// The cone's first way in contact on one, two and three ranks, whose boundaries go through the contact zone.
 #[test]
-#[ignore = "240 implicit steps of 6000 cells: several minutes"]
+fn ranks_agree_on_a_cone() {
+    let ends = [1, 2, 3].map(|ranks| {
+        let run = Run::of("cone").ranks(ranks).set("analysis.steps=6");
+        run.set("rigid.0.motion.displacement=[0,-0.009]").results().history("reaction.cone.y")
+    });
+    assert!(ends[0][5].abs() > 50.0, "{ends:?}");
+    for other in &ends[1..] {
+        assert!(relative_difference(other, &ends[0]) < 1e-8, "{ends:?}");
+    }
+}
+
+/// The same with five cells a radius over ten radii: from the sixth on each mean is in the band, and they are steady.
+#[test]
+#[ignore = "400 implicit steps of 4000 cells: two minutes of an optimised build"]
 fn a_cone_is_steady() {
     let results = Run::of("cone-deep").limit(3000).results();
-    let [before, end] =
-        [[2.0, 1.0], [1.0, 0.0]].map(|[from, to]| mean_resistance(&results, 0.1086, from, to));
-    for mean in [before, end] {
-        assert!((9.72..10.77).contains(&mean), "{before} {end}");
-    }
-    assert!((end / before - 1.0).abs() < 0.025, "{before} {end}");
+    let means: Vec<f64> = (0..5)
+        .rev()
+        .map(|rest| mean_resistance(&results, 0.175, f64::from(rest) + 1.0, f64::from(rest)))
+        .collect();
+    assert!(means.iter().all(|mean| (9.72..10.77).contains(mean)), "{means:?}");
+    let [least, most] = [f64::min, f64::max].map(|of| means.iter().copied().reduce(of).unwrap());
+    assert!(most / least < 1.03, "{means:?}");
+}
+
+/// Cones in sand and in drained Cam-clay under 100 kPa: demonstrations, steady over the last three of six radii within
+/// 5 %, at pressures in the ratio of the soils' strengths.
+#[test]
+#[ignore = "two runs of 240 implicit steps of 1300 cells: a minute of an optimised build"]
+fn cones_in_frictional_soils_are_steady() {
+    let clay = "material.soil={model=\"cam-clay\",young=6e6,poisson=0.3,slope=0.984,compression=0.1,\
+                swelling=0.02,ocr=2}";
+    let level = |run: Run| {
+        let results = run.limit(2000).results();
+        let means = [3.0, 2.0, 1.0].map(|from| mean_resistance(&results, 0.105, from, from - 1.0));
+        let [least, most] = [f64::min, f64::max].map(|of| means.into_iter().reduce(of).unwrap());
+        assert!(most / least < 1.05, "{means:?}");
+        means.iter().sum::<f64>() / 3.0
+    };
+    // In units of 10 kPa.
+    let (sand, clay) = (level(Run::of("cone-sand")), level(Run::of("cone-sand").set(clay)));
+    assert!((255.0..285.0).contains(&sand) && (66.0..74.0).contains(&clay), "{sand} {clay}");
 }
 
 /// N_c of a cone of the radius 17.5 mm in clay of 10 kPa, in the mean between so many radii before the end of its

@@ -80,4 +80,49 @@ mod tests {
             }
         }
     }
+
+    /// In a pit of slope 2 in the lower side of a block, what lies inside is nearest to facets, to edges that point
+    /// inwards, and to the corner; the normal is the gradient of the gap and the curvature that of the normal.
+    #[test]
+    fn edges_and_corners_that_point_inwards_curve_the_gap() {
+        let at = |reach: f64, z: f64| {
+            [[-reach, -reach, z], [reach, -reach, z], [reach, reach, z], [-reach, reach, z]]
+        };
+        let (outer, above, rim, apex) =
+            (at(1.5, 0.0), at(1.5, 1.0), at(0.15, 0.0), [0.0, 0.0, 0.3]);
+        let mut triangles = vec![[above[0], above[1], above[2]], [above[0], above[2], above[3]]];
+        for k in 0..4 {
+            let next = (k + 1) % 4;
+            triangles.push([outer[k], outer[next], above[next]]);
+            triangles.push([outer[k], above[next], above[k]]);
+            triangles.push([outer[k], rim[next], outer[next]]);
+            triangles.push([outer[k], rim[k], rim[next]]);
+            triangles.push([rim[k], apex, rim[next]]);
+        }
+        let solid = Solid::new(Path::new("pit.stl"), None, triangles).expect("a closed surface");
+        let surface = Triangles(Arc::new(solid));
+        // A facet, an edge and the corner: so many directions curve.
+        for (x, directions) in
+            [([0.17, 0.01, 0.16], 0), ([0.14, 0.12, 0.2], 1), ([0.03, -0.05, 0.4], 2)]
+        {
+            let near = surface.near(&x);
+            assert!(near.gap < 0.0, "{x:?} lies outside");
+            let trace = -near.gap * (0..3).map(|i| near.curvature[i][i]).sum::<f64>();
+            assert!((trace + f64::from(directions)).abs() < 1e-9, "{x:?}: {trace}");
+            for j in 0..3 {
+                let beside = |by: f64| {
+                    let mut x = x;
+                    x[j] += by;
+                    surface.near(&x)
+                };
+                let (more, less) = (beside(1e-6), beside(-1e-6));
+                let slope = (more.gap - less.gap) / 2e-6;
+                assert!((slope - near.normal[j]).abs() < 1e-8, "{x:?}: {slope} {near:?}");
+                for i in 0..3 {
+                    let turn = (more.normal[i] - less.normal[i]) / 2e-6;
+                    assert!((turn - near.curvature[i][j]).abs() < 1e-6, "{x:?}: {turn} {near:?}");
+                }
+            }
+        }
+    }
 }
