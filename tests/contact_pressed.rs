@@ -422,3 +422,39 @@ fn what_two_bodies_cannot_do_in_implicit_runs_is_told_with_the_cure() {
         assert!(!outcome.folder.path().join("out").exists(), "{to}");
     }
 }
+
+/// A block that only rests on another body is named before anything is solved: without friction it can slide, and a
+/// gap lets it fall. Friction holds it.
+#[test]
+fn a_block_that_only_rests_on_another_body_is_named() {
+    let text = |bottom: f64, friction: &str| {
+        format!(
+            "[analysis]\ntype = \"quasi-static\"\nsteps = 1\n[method]\nbasis = \"gimp\"\n\
+             [grid]\ntype = \"lattice\"\norigin = [-0.5, -0.5]\nsize = [2.0, 2.0]\nh = 0.25\n\
+             [material.m]\nmodel = \"hencky\"\nyoung = 1e6\npoisson = 0.3\n\
+             [[body]]\nname = \"ground\"\nmaterial = \"m\"\ndensity = 1000.0\n\
+             shape = {{ box = {{ min = [-0.25, -0.25], max = [1.25, 0.25] }} }}\n\
+             [[body]]\nname = \"block\"\nmaterial = \"m\"\ndensity = 1000.0\n\
+             shape = {{ box = {{ min = [0.1, {bottom}], max = [0.85, 0.8] }} }}\n\
+             [[boundary]]\nname = \"base\"\n\
+             where = {{ box = {{ min = [-0.25, -0.25], max = [1.25, -0.25] }} }}\n\
+             fix = [\"x\", \"y\"]\n\
+             [[load]]\ngravity = [0, -1]\n\
+             [[contact]]\nbetween = [\"block\", \"ground\"]\nfriction = {friction}\n"
+        )
+    };
+    for (bottom, friction, expected) in [
+        (0.25, "0.0", &["body \"block\" can move along x freely", "a body that it touches"][..]),
+        (0.3, "0.5", &["body \"block\" can", "freely"]),
+    ] {
+        let outcome = Run::text(&text(bottom, friction)).ranks(2).attempt();
+        let said = outcome.said();
+        assert_eq!(outcome.code, 2, "{said}");
+        assert!(expected.iter().all(|part| said.contains(part)), "{bottom} {friction}:\n{said}");
+        assert!(!outcome.folder.path().join("out").exists());
+    }
+    let results = Run::text(&text(0.25, "0.5")).results();
+    let weight = 1000.0 * (1.5 * 0.5 + 0.75 * 0.55);
+    let force = last(&results, "reaction.base.y");
+    assert!((force / weight - 1.0).abs() < 1e-6, "{force} {weight}");
+}

@@ -7,6 +7,7 @@ use nalgebra::DMatrix;
 
 use crate::basis;
 use crate::contact::fields::Fields;
+use crate::contact::law::Friction;
 use crate::contact::start::corners_within;
 use crate::deck::model::{Load, Symmetry};
 use crate::deck::schema::AXES;
@@ -16,6 +17,7 @@ use crate::ghost::FaceStencil;
 use crate::parallel::{World, exchange};
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::facing;
 use crate::system::numbering::Numbering;
 use crate::system::numbering::Touched;
 use crate::system::populated::Populated;
@@ -40,15 +42,77 @@ pub fn require<const D: usize>(
     active: &(Populated, Numbering),
     first: StepSpan,
 ) -> Result<()> {
-    match loose(world, model, points, active, first, None)? {
+    let found = match model.facing.is_empty() {
+        true => loose(world, model, points, active, first, (None, &[]))?,
+        false => loose_on_others(world, model, points, first)?,
+    };
+    let touched = match (model.contacts.is_empty(), model.facing.is_empty()) {
+        (true, true) => "",
+        (false, true) => ", nor a rigid body that it touches",
+        (_, false) => ", nor a body that it touches",
+    };
+    match found {
         None => Ok(()),
         Some((what, motion)) => Err(Error::Input(format!(
-            "{what} can {motion} freely: no boundary holds the nodes around it against this{}, so \
-             that the quasi-static system is singular; check the places and components of \
-             [[boundary]]",
-            if model.contacts.is_empty() { "" } else { ", nor a rigid body that it touches" }
+            "{what} can {motion} freely: no boundary holds the nodes around it against this{touched}, \
+             so that the quasi-static system is singular; check the places and components of \
+             [[boundary]]"
         ))),
     }
+}
+
+/// Where another body holds a piece of the material.
+struct Touch<const D: usize> {
+    /// A node of the grid that moves the piece there.
+    node: usize,
+    /// m
+    place: [f64; D],
+    normal: [f64; D],
+    /// Along the surface, too.
+    rubs: bool,
+}
+
+/// [`loose`] where bodies touch each other: of each field alone, while the others stay where they are and hold it along
+/// their surfaces' normals or, with friction, along all axes. What is free so is free with the others moving, too.
+/// Collective.
+fn loose_on_others<const D: usize>(
+    world: &World,
+    model: &Model<D>,
+    points: &Points<D>,
+    first: StepSpan,
+) -> Result<Option<(String, String)>> {
+    let (contacts, method) = (&model.contacts, &model.deck.method);
+    let basis = basis::of_deck(method.basis, method.gimp_edge);
+    let influences = world.fail_together(basis.map_points(&model.grid, points))?;
+    let near = facing::find(world, model, points, &influences)?;
+    for field in 0..contacts.fields.count() {
+        let own = |p: usize| contacts.fields.of_body(points.body[p] as usize) == field;
+        let there: Vec<usize> = (0..points.len()).filter(|&p| own(p)).collect();
+        if world.sum_usize(there.len()) == 0 {
+            continue;
+        }
+        let touches = near.iter().filter_map(|couple| {
+            let pair = &contacts.body_pairs[couple.pair];
+            let meets = couple.gap <= TOUCH * model.grid.cell_size() && own(couple.point);
+            let in_field = |node: &&usize| contacts.fields.of_node(**node) == field;
+            let node = couple.nodes.iter().find(in_field)?;
+            (meets && pair.presence.holds_in(first.stage)).then(|| Touch {
+                node: contacts.fields.place(*node),
+                place: couple.place,
+                normal: couple.normal,
+                rubs: pair.friction != Friction::Smooth,
+            })
+        });
+        let touches: Vec<Touch<D>> = touches.collect();
+        let mut alone = points.clone();
+        alone.select(&there);
+        let active = step_system::active(world, model, &alone)?;
+        let found = loose(world, model, &alone, &active, first, (None, &touches))?;
+        if found.is_some() {
+            return Ok(found);
+        }
+    }
+    Ok(None)
 }
 
 /// [`require`] of the later stages, with the bodies where they are at the start: what goes may be
@@ -116,7 +180,7 @@ pub fn falls<const D: usize>(
     if !pulled.contains(&true) {
         return Ok(None);
     }
-    let loose = loose(world, model, points, active, first, Some(pulled))?;
+    let loose = loose(world, model, points, active, first, (Some(pulled), &[]))?;
     Ok(loose.map(|(what, motion)| {
         format!(
             "{what} can {motion} freely under gravity: no boundary holds the nodes around it at the \
@@ -129,14 +193,14 @@ pub fn falls<const D: usize>(
 /// `pulled` axes. The piece is a body, with a point where it is not the whole of it. Every
 /// held component of a node is a row of the rigid motions' values there; the motions that all rows
 /// of a piece annihilate are free. Each piece is judged by the rank that owns its first node. The
-/// cells and nodes are those of [`crate::system::step_system::active`]. Collective.
+/// cells and nodes are those of [`crate::system::step_system::active`]; `touches`: where other bodies hold it. Collective.
 fn loose<const D: usize>(
     world: &World,
     model: &Model<D>,
     points: &Points<D>,
     (populated, numbering): &(Populated, Numbering),
     first: StepSpan,
-    pulled: Option<[bool; D]>,
+    (pulled, touches): (Option<[bool; D]>, &[Touch<D>]),
 ) -> Result<Option<(String, String)>> {
     let (deck, grid, partition) = (&model.deck, &model.grid, &model.partition);
     let faces = ties(world, model, populated)?;
@@ -184,9 +248,16 @@ fn loose<const D: usize>(
     }
     let extent = (middle, length);
     add_supports(model, points, (numbering, first.stage), &pieces, extent, &mut grams)?;
-    for (piece, rows) in
-        held_by_contact(model, points, (numbering, first), &pieces, (&middle, length))
-    {
+    let by_rigids = held_by_contact(model, points, (numbering, first), &pieces, (&middle, length));
+    let by_bodies = touches.iter().filter_map(|touch| {
+        let x: [f64; D] = std::array::from_fn(|a| (touch.place[a] - middle[a]) / length);
+        let rows = match touch.rubs {
+            true => (0..D).map(|i| motions_at(&x, i)).collect(),
+            false => vec![motions_along(&x, &touch.normal)],
+        };
+        Some((pieces[numbering.local(touch.node)?], rows))
+    });
+    for (piece, rows) in by_rigids.into_iter().chain(by_bodies) {
         let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
         for row in rows {
             for (i, a) in row.iter().enumerate() {
@@ -286,22 +357,24 @@ fn held_by_contact<const D: usize>(
         let nodes = near.nodes.iter().take(near.count);
         let local = nodes.filter_map(|&node| numbering.local(node)).next()?;
         let x: [f64; D] = std::array::from_fn(|a| (corner.place[a] - middle[a]) / length);
-        let along = |direction: &[f64; D]| -> Vec<f64> {
-            let rows = (0..D).map(|i| (direction[i], motions_at(&x, i)));
-            rows.fold(vec![0.0; D + D * (D - 1) / 2], |mut sum, (share, row)| {
-                sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += share * value);
-                sum
-            })
-        };
         let law = &contacts.pairs[corner.pair].law;
         let rows = if law.symmetric() {
-            vec![along(&corner.near.normal)]
+            vec![motions_along(&x, &corner.near.normal)]
         } else {
             (0..D).map(|i| motions_at(&x, i)).collect()
         };
         Some((pieces[local], rows))
     });
     held.collect()
+}
+
+/// What each rigid motion moves a place along a direction.
+fn motions_along<const D: usize>(x: &[f64; D], direction: &[f64; D]) -> Vec<f64> {
+    let rows = (0..D).map(|i| (direction[i], motions_at(x, i)));
+    rows.fold(vec![0.0; D + D * (D - 1) / 2], |mut sum, (share, row)| {
+        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += share * value);
+        sum
+    })
 }
 
 /// Ghost faces that hold cells together which share no node: only among simplices.
