@@ -343,6 +343,7 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
         tolerance: 1e-9,
         max_evaluations: 10,
         inverted: model.deck.analysis.inverted_iterates,
+        ends_where_stalled: false,
     };
     let left_out = mesh.nodes_left_out(world, model.deck.method.drop_below);
     let owned = numbering.owned * D;

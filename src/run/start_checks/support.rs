@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::DMatrix;
 
-use crate::basis;
+use crate::basis::{self, radial};
 use crate::contact::fields::Fields;
 use crate::contact::law::Friction;
 use crate::contact::start::corners_within;
@@ -83,7 +83,11 @@ fn loose_on_others<const D: usize>(
 ) -> Result<Option<(String, String)>> {
     let (contacts, method) = (&model.contacts, &model.deck.method);
     let basis = basis::of_deck(method.basis, method.gimp_edge);
-    let influences = world.fail_together(basis.map_points(&model.grid, points))?;
+    let mut influences = world.fail_together(basis.map_points(&model.grid, points))?;
+    if contacts.rings {
+        let turned = radial::make_rings(&model.grid, &*basis, points, &mut influences);
+        world.fail_together(turned)?;
+    }
     let near = facing::find(world, model, points, &influences)?;
     for field in 0..contacts.fields.count() {
         let own = |p: usize| contacts.fields.of_body(points.body[p] as usize) == field;
