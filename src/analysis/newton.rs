@@ -237,7 +237,8 @@ fn solve_robustly<const D: usize, const N: usize>(
             solution.values_mut()?.fill(0.0);
             outcome = snes.solve(problem, matrix, solution)?;
         }
-        let words = format!("the iterates came no closer; solved again with {}", shape.search.words());
+        let words =
+            format!("the iterates came no closer; solved again with {}", shape.search.words());
         return Ok((outcome, Some(words)));
     }
     let stronger = linear.stronger::<D>(equations, outcome.linear_failure);
