@@ -29,7 +29,7 @@ pub fn open(path: &Path, most: u64) -> Result<File> {
 
 /// Reads a regular file of at most `most` bytes. Errors as for [`open`].
 pub fn read(path: &Path, most: u64) -> Result<Vec<u8>> {
-    // Files of the system's own tell no length, or one that is not true.
+    // Files of the system's own have no length, or one that is not true.
     read_all(open(path, most)?, most)
 }
 

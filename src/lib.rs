@@ -8,7 +8,7 @@
 //! | command line, exit codes | [`cli`], [`error`] |
 //! | a run from command line to exit code | [`run`] |
 //! | the algorithms: load steps, time steps, Newton's method (Ghost §2.3, 2.4; Lagrangian §6.3, 6.5) | [`analysis`] |
-//! | what a run tells | [`record`] |
+//! | records of a run: history, frames, checkpoints | [`record`] |
 //! | results on disk and on the terminal | [`output`] |
 //! | mass of the nodes and its solve (Ghost eq. 7, 15, 24) | [`mass`] |
 //! | points to nodes and back (Ghost eq. 6, 8-10; Lagrangian eq. 31-39) | [`transfer`] |

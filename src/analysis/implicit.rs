@@ -356,7 +356,7 @@ struct Totals {
 }
 
 impl Totals {
-    /// Adds a step's work and Ghost energy; its row then tells those of the run.
+    /// Adds a step's work and Ghost energy; its row then has those of the run.
     fn add(&mut self, row: &mut HistoryRow) {
         self.work += row.work_external;
         self.ghost += row.energy_ghost;

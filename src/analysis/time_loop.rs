@@ -48,7 +48,7 @@ pub enum Answer {
 /// How lines and messages name the steps of an analysis.
 #[derive(Debug, Clone, Copy)]
 pub struct Labels {
-    /// Of Newton's iteration: the terminal tells of it.
+    /// The terminal shows Newton's iterations.
     pub newton: bool,
     /// Frames and messages carry the time rather than the load factor.
     pub time: bool,

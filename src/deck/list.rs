@@ -66,7 +66,7 @@ pub fn list() -> String {
     out
 }
 
-/// What fits into a line; the rest is told by `--explain`.
+/// What fits into a line; `--explain` prints the rest.
 fn cut(text: &str) -> String {
     const MOST: usize = 110;
     if text.chars().count() <= MOST {

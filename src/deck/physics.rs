@@ -179,7 +179,7 @@ pub fn difference(first: &str, second: &str) -> Option<(String, String)> {
 /// Keys that format 1 of the checkpoints did not know, and what its programs did.
 const FORMER: [(&str, &str, &str); 1] = [("[method]", "gimp_edge", "\"published\"")];
 
-/// [`difference`] from the text in a checkpoint of format 1, whose programs told other keys: sections
+/// [`difference`] from the text in a checkpoint of format 1, whose programs wrote other keys: sections
 /// must be those of `ours`, and keys that both texts have must agree. A key of `ours` alone must have
 /// the value that stands for what those programs did.
 pub fn difference_from_format_1(theirs: &str, ours: &str) -> Option<(String, String)> {
@@ -237,7 +237,7 @@ fn entries(text: &str) -> Vec<Entry> {
     entries
 }
 
-/// Time steps of the two texts where `now` tells one: that of format 1 follows from its steps.
+/// Time steps of the two texts where `now` has one: that of format 1 follows from its steps.
 fn time_step_of(former: &[Entry], now: &[Entry]) -> Option<(String, String)> {
     let told = now.iter().find(|entry| entry.key == "time step")?;
     let number = |key: &str| -> Option<f64> {
@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn format_1_is_compared_by_the_keys_of_both() {
         let ours = of(&["ghost=off", "method.gimp_edge=\"published\""]);
-        // Earlier programs told keys without effect, and had no other edge than the published one.
+        // Earlier programs wrote keys without effect, and had no other edge than the published one.
         let theirs = ours.replace("gimp_edge = \"published\"", "stress_update = \"usl\"");
         assert_ne!(theirs, ours);
         assert_eq!(difference_from_format_1(&theirs, &ours), None);

@@ -11,7 +11,7 @@ pub struct BoundaryFace {
     pub bodies: u64,
 }
 
-/// The bodies of a cell; neighbour ranks are told of it.
+/// The bodies of a cell, which is sent to neighbour ranks.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Cell {
     /// Bodies that populate the cell, one bit each.
@@ -29,7 +29,7 @@ impl Cell {
     }
 }
 
-/// The populated cells of this rank, ascending, and those of other ranks that it was told of.
+/// The populated cells of this rank, ascending, and those that other ranks have sent.
 pub(crate) struct KnownCells {
     first: usize,
     /// Index in `own` of each cell from number `first` on; empty where the numbers lie far apart.

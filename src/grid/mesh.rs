@@ -10,7 +10,7 @@
 //! | tet4 | about 77 |
 //! | hex8 | about 160 |
 //!
-//! [`Mesh::memory_bytes`] tells the actual sum.
+//! [`Mesh::memory_bytes`] gives the actual sum.
 
 use std::collections::BTreeMap;
 

@@ -148,7 +148,7 @@ pub enum OnSurface<'a, const D: usize> {
     },
 }
 
-/// What the start of a run tells of a load.
+/// Points and surfaces that a load names, found at the start of a run.
 #[derive(Debug, Clone, Default)]
 pub struct Found<const D: usize> {
     /// Who carries a point force that is a function.

@@ -57,7 +57,7 @@ pub struct System<'a, const C: usize> {
     factor: Option<&'a Factor>,
     /// Of owned nodes: to be solved for.
     free: &'a [[bool; C]],
-    /// Values at local nodes, with room for a complete factor's chunks.
+    /// Values at local nodes, filled up to whole chunks of a complete factor.
     local: Vec<[f64; C]>,
 }
 

@@ -163,7 +163,7 @@ fn remove<'a>(folder: &Path, names: impl Iterator<Item = &'a String>) -> Result<
     Ok(())
 }
 
-/// Permission bits do not tell the whole truth (quota, read-only mounts): write something.
+/// Permission bits do not show quotas and read-only mounts: write something.
 fn probe(path: &Path) -> Result<()> {
     let file = path.join(".writable.partial");
     fs::write(&file, b"x").map_err(|reason| {

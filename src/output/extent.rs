@@ -65,7 +65,7 @@ pub fn body_summaries<const D: usize>(
         .collect()
 }
 
-/// Peak resident memory over the ranks; zero where the system does not tell.
+/// Peak resident memory over the ranks; zero where the system does not say.
 pub fn peak_memory(comm: &SimpleCommunicator) -> PeakMemory {
     let mine = std::fs::read_to_string("/proc/self/status")
         .ok()

@@ -35,7 +35,7 @@ pub fn write_whole(path: &Path, content: &[u8]) -> Result<()> {
     })
 }
 
-/// Brings the names in a folder to the disk; not every file system can be told so.
+/// Brings the names in a folder to the disk; not every file system can do this.
 pub fn sync_names(folder: &Path) {
     if let Ok(folder) = File::open(folder) {
         let _ = folder.sync_all();

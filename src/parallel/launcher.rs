@@ -1,7 +1,7 @@
 //! Whether the launcher that started this process belongs to the MPI that the program is linked with.
 //! A launcher of another MPI starts n runs of one rank each.
 
-/// Variables by which launchers tell how many processes they have started: Open MPI's mpirun,
+/// Variables in which launchers leave the number of processes that they have started: Open MPI's mpirun,
 /// those of MPICH and Intel MPI, srun. What Slurm grants to a job (`SLURM_NTASKS`) is not among them:
 /// in a job of many tasks anybody may run a program on one rank.
 const SIZES: [(&str, &str); 3] = [
@@ -32,7 +32,7 @@ pub fn warning(
     ))
 }
 
-/// The rank of this process as its launcher tells before MPI starts; 0 without a launcher.
+/// The rank of this process by its launcher's variables, before MPI starts; 0 without a launcher.
 pub fn rank_of_process(variable: impl Fn(&str) -> Option<String>) -> usize {
     let names = ["OMPI_COMM_WORLD_RANK", "PMIX_RANK", "PMI_RANK", "SLURM_PROCID"];
     names.iter().find_map(|name| variable(name)?.parse().ok()).unwrap_or(0)

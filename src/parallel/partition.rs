@@ -326,7 +326,7 @@ impl<const D: usize> Partition<D> {
     }
 }
 
-/// What the ranks (ascending) tell of their units: the costs added up, ascending by unit, and the
+/// Sums over what the ranks (ascending) have sent of their units: the costs added up, ascending by unit, and the
 /// rank that holds most of each.
 fn joined(gathered: Vec<(usize, Vec<UnitCost>)>) -> (Vec<UnitCost>, Vec<u32>) {
     let mut all: Vec<(UnitCost, usize)> = gathered

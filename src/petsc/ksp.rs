@@ -216,7 +216,7 @@ fn outcome_here(ksp: sys::KSP) -> Result<KspOutcome> {
     })
 }
 
-/// The same with the preconditioner's cause, and whether this rank has one to tell.
+/// The same with the preconditioner's cause, and whether this rank has one.
 fn failure_here(ksp: sys::KSP) -> Result<(KspOutcome, bool)> {
     let mut outcome = outcome_here(ksp)?;
     if reason_of(ksp)? != sys::KSP_DIVERGED_PC_FAILED {

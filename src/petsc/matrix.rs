@@ -229,7 +229,7 @@ impl Matrix {
         self.declare_symmetry()
     }
 
-    /// An assembly makes PETSc forget what it was told.
+    /// PETSc forgets both at an assembly.
     fn declare_symmetry(&mut self) -> Result<()> {
         if let Some(symmetric) = self.symmetric {
             petsc!(MatSetOption(self.raw, sys::MAT_SYMMETRIC, bool_of(symmetric)))?;

@@ -8,7 +8,7 @@
 //! | `abort.rs` | the end of all ranks at once |
 //! | `options.rs` | defaults that the user can override, options nobody read |
 //! | `files.rs` | files that options name, tried before PETSc does |
-//! | `known.rs` | options no solver knows, told before the run |
+//! | `known.rs` | options that no solver knows, refused before the run |
 //! | `vector.rs` | [`Vector`]: distributed vector with borrowed local values |
 //! | `matrix.rs` | [`Matrix`]: compressed rows of fixed pattern, fast update of the values |
 //! | `product_matrix.rs` | [`Product`]: a matrix that is known by its products |

@@ -8,7 +8,7 @@ use super::check::{c_text, free, petsc, require_running, text_of};
 use super::sys;
 use crate::error::Result;
 
-/// Names set by the program itself: the user is not told when they go unread.
+/// Names set by the program itself: that they go unread is not reported.
 static BUILT_IN: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
 
 /// Sets option `name` (with or without its dash) where the user has not set it. "" for a bare

@@ -111,7 +111,7 @@ impl<P: Product> ProductMatrix<P> {
         // SAFETY: the box that `new` gave up lives as long as the shell, and PETSc is not
         // multiplying while this runs.
         act(unsafe { &mut (*data.cast::<Context<P>>()).product })?;
-        // The way to tell users of the matrix.
+        // Users of the matrix see the change by this.
         petsc!(MatAssemblyBegin(self.raw(), sys::MAT_FINAL_ASSEMBLY))?;
         petsc!(MatAssemblyEnd(self.raw(), sys::MAT_FINAL_ASSEMBLY))
     }

@@ -206,7 +206,7 @@ impl DerefMut for LocalValuesMut<'_> {
 
 impl Drop for LocalValuesMut<'_> {
     fn drop(&mut self) {
-        // SAFETY: returns what `of` took; this also tells PETSc that the values changed.
+        // SAFETY: returns what `of` took; this also makes PETSc note that the values changed.
         unsafe { sys::VecRestoreArray(self.raw, &mut self.pointer) };
     }
 }

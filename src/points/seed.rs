@@ -83,7 +83,7 @@ pub struct CellByCell<'a, const D: usize> {
 }
 
 impl<'a, const D: usize> CellByCell<'a, D> {
-    /// `first_ids` as [`seed`] tells.
+    /// `first_ids`: see [`seed`].
     pub fn new(deck: &'a Deck, grid: &'a Grid<D>, first_ids: Vec<u64>) -> Result<Self> {
         let of = |(index, body): (usize, &'a Body)| match (&body.source, grid) {
             (BodySource::Shape { seeding: Seeding::Lattice { .. }, .. }, _)

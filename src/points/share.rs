@@ -19,7 +19,7 @@ impl Share {
 
     /// This rank's part of a box of `size` candidates: about as many inside the shape as on any
     /// other rank, and in slices across the longest axis, as parts of the body will mostly be, so
-    /// that few points have to change rank. `inside` tells of a place in units of candidates.
+    /// that few points have to change rank. `inside`: of a place in units of candidates.
     pub(crate) fn of_box<const D: usize>(
         &self,
         size: [usize; D],

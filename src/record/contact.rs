@@ -1,4 +1,4 @@
-//! What contacts tell of a step, and their sums over a run.
+//! Contact in the history: its columns of a step, and their sums over a run.
 
 use crate::contact::facets::Facets;
 use crate::contact::pose::Pose;

@@ -13,7 +13,7 @@ use crate::transfer::update::PointEnergies;
 /// Energy may exceed what was there and what work brought in by this share of their sum; the
 /// explicit schemes stray by less in every stable run of the papers.
 const GROWTH: f64 = 0.25;
-/// From this share on a gain is told: it is no longer the scheme's ordinary error.
+/// From this share on a gain is reported: it is no longer the scheme's ordinary error.
 const WORTH_A_WARNING: f64 = 0.05;
 /// Below this share of m c^2, the energy of a strain of 1e-4, nothing is judged: bodies at rest.
 const NOISE: f64 = 1e-8;

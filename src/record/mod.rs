@@ -1,4 +1,4 @@
-//! What a run tells about itself while it goes on.
+//! Records of a run while it goes on: history, frames, checkpoints, figures of merit.
 //!
 //! | idea | file | source |
 //! |---|---|---|

@@ -32,7 +32,7 @@ impl Figures {
     }
 }
 
-/// Figures of merit at the end of a run; the log tells which have no value. Collective.
+/// Figures of merit at the end of a run; the log names those without a value. Collective.
 pub fn of_run<const D: usize>(run: &mut Run<D>) -> Result<BTreeMap<String, f64>> {
     let Run { world, model, points, recorder, .. } = run;
     let (factor, time) = recorder.reached;

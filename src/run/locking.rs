@@ -2,8 +2,8 @@
 //!
 //! Each point is one condition on the volume, and a cell with several points has more of them than
 //! its nodes have freedom: stiffness and pressures come out too large (docs/theory/theory.md,
-//! F-bar). Explicit runs are not warned: their points stiffen as well, but what they cost is told by
-//! the time step.
+//! F-bar). Explicit runs are not warned: their points stiffen as well, but the time step shows what
+//! they cost.
 
 use crate::deck::model::{AnalysisType, Locking};
 use crate::material::{Material, local};

@@ -10,7 +10,7 @@
 //! | surfaces and the points that carry them | `surfaces.rs` |
 //! | stress before the first step | `initial_stress.rs` |
 //! | what is checked before anything is written | `start_checks/` |
-//! | what the run will do, told ahead | `plan.rs`, `plan_checks.rs`, `lengths.rs`, `locking.rs`, `thin.rs` |
+//! | what the run will do, printed ahead | `plan.rs`, `plan_checks.rs`, `lengths.rs`, `locking.rs`, `thin.rs` |
 //! | the process that MPI starts | `process.rs` |
 
 mod aside;

@@ -135,12 +135,12 @@ fn filling<const D: usize>(
     };
     let seeded = world.sum_slice(&seeded);
     if world.rank() > 0 {
-        // The first rank tells it; volumes of shapes take some hundredths of a second.
+        // The first rank prints it; volumes of shapes take some hundredths of a second.
         return Vec::new();
     }
     // Decks of very many bodies need no line for each.
     model.deck.bodies.iter().zip(seeded).take(LINES).filter_map(row).collect()
 }
 
-/// Bodies that a plan tells of one by one.
+/// Bodies that a plan lists one by one.
 const LINES: usize = 20;

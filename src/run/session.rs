@@ -155,7 +155,7 @@ fn read_deck_text(world: &World, arguments: &Arguments) -> Result<String> {
 
 fn versions() -> BTreeMap<String, String> {
     let mpi = mpi::environment::library_version().unwrap_or_default();
-    // The first line: MPICH's others tell how it was built.
+    // The first line: the others of MPICH are about its build.
     let mpi = mpi.split([',', '\n']).next().unwrap_or_default();
     let mpi = mpi.split_whitespace().collect::<Vec<_>>().join(" ");
     BTreeMap::from([

@@ -19,7 +19,7 @@ use crate::points::Points;
 use super::numbering::{Numbering, Touched};
 
 /// Weights up to this are those of nodes off a face, if the point lies on one: above the round-off
-/// by which places on faces are told.
+/// that decides whether a place is on a face.
 const NEAR: f64 = 1e-8;
 
 /// A point on a face, and the cells that hold it.

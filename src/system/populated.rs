@@ -23,7 +23,7 @@ pub struct Populated {
     pub further: Vec<Vec<(usize, u64)>>,
 }
 
-/// Bodies that the bits of one word tell apart.
+/// Bodies that have a bit of their own in one word.
 pub const GROUP: usize = u64::BITS as usize;
 
 impl Populated {

@@ -181,7 +181,7 @@ fn longest(low: &[f64], high: &[f64]) -> f64 {
     low.iter().zip(high).map(|(low, high)| high - low).fold(0.0, f64::max)
 }
 
-/// Lower and upper corner, where the deck tells them.
+/// Lower and upper corner, where the deck gives them.
 fn grid_bounds(grid: &Grid) -> Option<(Vec<f64>, Vec<f64>)> {
     match grid {
         Grid::Lattice(LatticeGrid { origin, spacing, cells }) => {

@@ -264,7 +264,7 @@ fn between(
     let Some([first, second]) = names.as_deref() else { return Err(table.wrong("between", node)) };
     let rigid_names: Vec<&str> = match rigids {
         Some(rigids) => rigids.iter().map(|rigid| rigid.name.as_str()).collect(),
-        // Their own faults have been told.
+        // Their own faults are reported already.
         None => vec![first, second],
     };
     let rigid = |name: &str| rigid_names.iter().position(|known| *known == name);

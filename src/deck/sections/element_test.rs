@@ -69,7 +69,7 @@ pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
     })
 }
 
-/// `names` of the materials, if they could be read: else their own faults are told alone.
+/// `names` of the materials, if they could be read: else only their own faults are reported.
 fn element_test(table: &Table<'_>, names: Option<&[String]>) -> Got<ElementTest> {
     let material = table.text("material");
     let path: Got<ElementPath> = table.choice("path");

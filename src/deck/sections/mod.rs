@@ -63,7 +63,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let output = root.table_or_default("output", |table| results::output(&table, kind));
     let parallel = root.table_or_default("parallel", |table| results::parallel(&table));
     let petsc = petsc::petsc(&root);
-    // Of an analysis that could not be read [element_test] tells the kind.
+    // Where [analysis] could not be read, [element_test] shows its kind.
     let alone = kind.is_none() && root.given("element_test");
     if alone || kind == Some(AnalysisType::ElementTest) {
         let basics = element_test::Basics { title, analysis, method, materials, output, parallel };

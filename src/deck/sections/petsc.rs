@@ -76,7 +76,7 @@ fn check(name: &str, value: &str) -> Result<(), String> {
             PREFIXES.join(", ")
         ));
     };
-    // PETSc does not tell large letters from small ones.
+    // PETSc takes capital and small letters alike.
     let (own, word) = (own.to_ascii_lowercase(), value.to_ascii_lowercase());
     let names_file = OF_FILES.iter().any(|part| own.contains(part) || word == *part);
     let printing = PRINTING.iter().any(|part| own.contains(part));

@@ -69,7 +69,7 @@ pub fn body_surface(
     };
     let (body, side, within) = (body?, side?, within?);
     let side = side.map(|side| (side / 2, side % 2 == 1));
-    // Bodies with faults of their own have been told of.
+    // Faults of the bodies themselves are reported already.
     let Some(read) = read else { return Ok(BodySurface { body, side, within }) };
     let key = if table.given("body") { "body" } else { "" };
     let name = &names[body];

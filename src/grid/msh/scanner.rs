@@ -77,7 +77,7 @@ impl<'a> Scanner<'a> {
         Err(SyntaxError(format!("{expected} should stand where {} stands", quoted(line.trim()))))
     }
 
-    /// The file is binary; a four-byte one here tells the order of its bytes.
+    /// The file is binary; the number one here, four bytes long, shows the order of its bytes.
     pub fn binary_from_here(&mut self) -> Result<(), SyntaxError> {
         self.form = match self.take::<4>()? {
             [1, 0, 0, 0] => Form::LittleEndian,

@@ -25,7 +25,7 @@ pub(super) fn entities(
     Ok(())
 }
 
-/// The pieces into which a partition has cut the entities; they take the groups along. Before the
+/// The parts into which a partition has cut the entities; they keep the groups. Before the
 /// box stand the parent's dimension and number, and the parts that the piece belongs to.
 pub(super) fn partitioned_entities(
     scanner: &mut Scanner,
@@ -63,7 +63,7 @@ fn entity(
     let count = scanner.size()?;
     let mut own = Vec::new();
     for _ in 0..count {
-        // The sign tells the direction of the entity in the group.
+        // The sign is the direction of the entity in the group.
         own.push(scanner.int()?.abs());
     }
     if dimension > 0 {

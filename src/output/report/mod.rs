@@ -1,4 +1,4 @@
-//! `report.html`: one file that tells of a run, for any browser, without a network.
+//! `report.html`: a run in one file, for any browser, without a network.
 //!
 //! | file | idea |
 //! |---|---|

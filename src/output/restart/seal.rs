@@ -1,4 +1,4 @@
-//! The seal at the end of a checkpoint: a few bytes behind the HDF5 content that tell its
+//! The seal at the end of a checkpoint: a few bytes behind the HDF5 content with its
 //! length, its format and its checksum. It is tested before HDF5 sees the file, so that no damage
 //! ever reaches a parser, and it is only there when the file was finished.
 

@@ -1,4 +1,4 @@
-//! Small files that tell readers the frames of a series and their times.
+//! Small files that list the frames of a series and their times.
 //!
 //! | file | lists | for |
 //! |---|---|---|

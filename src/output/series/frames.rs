@@ -302,7 +302,7 @@ fn columns(file: &hdf5::File, flat: bool, most: usize) -> hdf5::Result<Vec<Colum
         let own = words.iter().enumerate().filter(|(_, word)| !is_zero(word));
         parts.extend(own.map(|(k, word)| column(format!("{name}.{word}"), Some(k))));
     }
-    // The partition is told by `rank`, last of all.
+    // `rank` shows the partition: it comes last.
     whole.sort_by_key(|column| {
         ["body", "rank"].iter().position(|n| *n == column.name).map_or(0, |k| k + 1)
     });

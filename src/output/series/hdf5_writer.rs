@@ -147,7 +147,7 @@ impl<'c> FileWriter<'c> {
     pub fn close_unnamed(mut self) -> Result<Partial> {
         let path = self.path().to_path_buf();
         let closed = self.layout.take().map_or(Ok(()), close);
-        // Some file systems tell only now that there was no room.
+        // Some file systems report a full disk only now.
         let outcome = closed
             .map_err(|reason| refused(&path, &reason))
             .and_then(|()| self.rows.sync_all().map_err(|reason| cannot_write(&path, &reason)));

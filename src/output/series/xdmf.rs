@@ -1,4 +1,4 @@
-//! XDMF time series: small XML files that tell ParaView where in the HDF5 files the data are.
+//! XDMF time series: small XML files by which ParaView finds the data in the HDF5 files.
 //!
 //! Rules that readers crash on when broken: geometry has three columns always; point clouds
 //! state `NodesPerElement`; steps sit in a temporal collection; HDF5 files are named without a

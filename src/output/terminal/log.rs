@@ -101,7 +101,7 @@ impl Log {
         }
     }
 
-    /// [`Self::warn`] of what `step` met; `text` tells what may come back in later steps, which then
+    /// [`Self::warn`] of what `step` met; `text` is what may come back in later steps, which then
     /// only the file and the count show. `detail` belongs to this step.
     pub fn warn_of_step(&mut self, step: usize, text: &str, detail: &str) {
         let whole = format!("warning: step {step}: {text} {detail}");
@@ -164,7 +164,7 @@ fn painted(text: &str) -> std::borrow::Cow<'_, str> {
 }
 
 /// Open MPI gives every rank a pseudo-terminal, also when its own output goes to a file; then
-/// only the launcher's output tells.
+/// only the launcher's output shows.
 fn stdout_is_terminal() -> bool {
     if !std::io::stdout().is_terminal() {
         return false;

@@ -102,7 +102,7 @@ struct Appended<'a> {
 #[derive(Default)]
 struct Layout {
     big_endian: bool,
-    /// Bytes of the numbers that tell lengths.
+    /// Bytes of a number that is a length.
     count: usize,
     zlib: bool,
 }
@@ -125,7 +125,7 @@ impl Layout {
         })
     }
 
-    /// The number that tells a length, at the beginning of `bytes`, and the rest.
+    /// The length at the beginning of `bytes`, and the rest.
     fn length<'b>(&self, bytes: &'b [u8]) -> Got<(usize, &'b [u8])> {
         let Some((own, rest)) = bytes.split_at_checked(self.count) else { return cut_short() };
         let mut all = [0; 8];

@@ -12,7 +12,7 @@ use std::collections::BTreeMap;
 
 use super::Recorder;
 
-/// What the summary tells beside what the recorder knows.
+/// Contents of the summary beside those that the recorder has.
 pub struct Closing<'a> {
     pub communication: Communication,
     /// Figures of merit.

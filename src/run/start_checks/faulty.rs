@@ -3,7 +3,7 @@
 use crate::parallel::World;
 use crate::points::Points;
 
-/// What `say` tells of the point with the lowest id that has a fault, on all ranks. Collective.
+/// The text of `say` about the point with the lowest id that has a fault, on all ranks. Collective.
 pub fn of_first_point<const D: usize, F>(
     world: &World,
     points: &Points<D>,

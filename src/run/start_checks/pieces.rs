@@ -1,4 +1,4 @@
-//! Connected pieces of the material: populated cells that share a node, or that a Ghost face ties,
+//! Connected components of the material, called pieces here: populated cells that share a node, or that a Ghost face ties,
 //! hold each other.
 
 use crate::error::Result;

@@ -11,7 +11,7 @@ use super::term::Health;
 
 /// T_ij a_j, N, with P~ of the previous frame and the area a at the step's start, m2; and where
 /// `wanted` d(T a)_i/du_bk of each node b of the point, N/m. Zero where the stress is not finite, which
-/// the stress term tells of.
+/// the stress term reports.
 pub fn on_area<const D: usize>(
     step: StepPoints<'_, D>,
     p: usize,
