@@ -374,14 +374,33 @@ fn groups_tell_rows_with_equal_ends_apart() {
     assert!(groups.nodes(2).is_empty());
 }
 
+const SPLINE: &str = r#"
+[analysis]
+type = "quasi-static"
+steps = 1
+[method]
+basis = "spline"
+[grid]
+type = "lattice"
+origin = [0, 0]
+size = [4, 4]
+h = 1
+[material.m]
+model = "hencky"
+young = 1.0
+poisson = 0.3
+[[body]]
+material = "m"
+shape = { box = { min = [1, 1], max = [2, 2] } }
+[[boundary]]
+where = { side = "left" }
+fix = ["x", "y"]
+"#;
+
 /// The example of the guide is a file and its name in the list: the deck knows it by that.
 #[test]
 fn a_basis_is_a_file_and_a_line() {
-    let text = "[analysis]\ntype = \"quasi-static\"\nsteps = 1\n[method]\nbasis = \"spline\"\n[grid]\ntype = \
-                \"lattice\"\norigin = [0, 0]\nsize = [4, 4]\nh = 1\n[material.m]\nmodel = \"hencky\"\nyoung = \
-                1.0\npoisson = 0.3\n[[body]]\nmaterial = \"m\"\nshape = { box = { min = [1, 1], max = [2, 2] } }\n";
-    let deck =
-        crate::deck::read(std::path::Path::new("deck.toml"), text, &[]).expect("a sound deck");
+    let deck = crate::deck::read(std::path::Path::new("deck.toml"), SPLINE, &[]).expect("sound");
     let basis = deck.method.basis;
     assert_eq!((basis.name(), basis.domain()), ("spline", super::Domain::None));
     assert!(!of_deck::<2>(basis, GimpEdge::Continued).within_cells());
