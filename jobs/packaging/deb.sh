@@ -12,7 +12,7 @@ mirror=${MIRROR:-http://deb.debian.org/debian}
 suite=$(. /etc/os-release && echo "$VERSION_CODENAME")
 mkdir -p "$place"
 rm -f "$place"/*.deb
-cargo deb ${DEB_FLAGS:-} --output "$place"
+cargo deb --strip ${DEB_FLAGS:-} --output "$place"
 package=$(ls "$place"/*.deb)
 dpkg-deb --info "$package" | sed -n '/Depends/p;/Installed-Size/p;/Description/p'
 
