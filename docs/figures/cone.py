@@ -1,7 +1,8 @@
-"""Resistance of cones over depth, from history.csv of runs: cone.py TRESCA SAND CLAY [ROUGH] -o cone-depth.svg
+"""Resistance of cones over depth, from history.csv of runs.
 
-TRESCA: inputs/cone-deep.toml; SAND: inputs/cone-sand.toml; CLAY: the latter with the material of its header; ROUGH: the
-cone alone rough (docs/evidence/contact.md).
+cone.py TRESCA=0.175 SAND=0.105 CLAY=0.105 -o cone-depth.png
+TRESCA: folder of inputs/cone-deep.toml; SAND: of inputs/cone-sand.toml; CLAY: of the latter with the material of its header.
+After "=" stands the way of the cone in m. Needs matplotlib.
 """
 
 import argparse
@@ -41,9 +42,9 @@ def main():
     parser.add_argument("-o", "--output", required=True)
     args = parser.parse_args()
     runs = [(folder, *curve(folder, float(path))) for folder, path in (a.rsplit("=", 1) for a in args.folders)]
-    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(8, 3.6), dpi=80, layout="constrained")
     left.axhspan(9.72, 10.77, color="0.9", label="9.72 to 10.77, smooth")
-    labels = ["Tresca, smooth", "sand, 30 degrees", "Cam-clay, drained", "Tresca, rough cone"]
+    labels = ["Tresca, smooth", "sand, 30 degrees", "Cam-clay, drained"]
     for label, (_, depth, q) in zip(labels, runs):
         axis, scale = (left, 10e3) if label.startswith("Tresca") else (right, 100e3)
         values = [v / scale for v in q]
