@@ -3,7 +3,7 @@
 //! Smoothers, residuals and transfers multiply by matrices in single precision: they stream from
 //! memory, and have less than half the bytes. The iteration outside keeps the exact matrix, so the
 //! answer does not change. The levels are symmetric. Under an unsymmetric matrix A they are those of
-//! (A + A^T) / 2.
+//! (A + A^T) / 2 but for the products of the finest one, which are A's ([`super`] has the exception): docs/evidence/unsymmetric.md.
 
 use super::block_smoother::BlockSmoother;
 use crate::blocks::BlockProduct;
@@ -15,7 +15,7 @@ use crate::petsc::{Index, Ksp, Matrix, agree};
 
 /// Levels from the finest to the last but one, and the last.
 pub struct Hierarchy {
-    /// The matrix A itself. That of the finest level is its symmetric part, rounded.
+    /// The matrix A itself. That of the finest level is A or its symmetric part, rounded.
     pub exact: BlockProduct<f64>,
     /// From the finest to the last but one.
     pub levels: Vec<Smoothed>,
@@ -56,8 +56,8 @@ pub trait Levelled {
     /// Levels for the values that the matrix has. `None`: there are none for it.
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>>;
 
-    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact, and their
-    /// symmetric part into the matrix of its finest level.
+    /// The values that the matrix has now, into what [`Self::hierarchy`] gave as exact, and into the matrix of
+    /// its finest level, their symmetric part if that one is symmetric.
     fn fill(
         &mut self,
         matrix: &mut Matrix,

@@ -17,7 +17,8 @@
 //! | their smoother | `block_smoother.rs` |
 //!
 //! The levels are those of a symmetric matrix. Under an unsymmetric A they are made from
-//! (A + A^T) / 2, and the iteration outside multiplies by A.
+//! (A + A^T) / 2; the iteration outside and the smoother of the finest level multiply by A. Where penalties
+//! tie nodes, that smoother multiplies by the symmetric part, too.
 //!
 //! Whole blocks of a node are the unit throughout, each rank works on its own rows, and nothing
 //! depends on how nodes are dealt out to ranks but the order of sums: iterations are the same on
@@ -189,11 +190,18 @@ pub fn build_unsymmetric<const K: usize, const C: usize>(
     let mut exact = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
     fill(rows, &mut exact);
     let symmetric = surrogate_of(world, nodes, rows, ties)?;
-    let rounded = product(nodes, &symmetric);
+    // Where penalties tie nodes, A has no definite symmetric part before it is corrected.
+    let mut rounded = product(nodes, &symmetric);
+    if !ties.are_there(world) {
+        let ghosts = nodes.global[nodes.owned..].to_vec();
+        rounded = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
+        fill(rows, &mut rounded);
+    }
     levels::<K, C>(world, (nodes, &symmetric, &ties.nodes), exact, rounded)
 }
 
-/// The hierarchy with `exact` outside and the symmetric `rows`, rounded, on the finest level.
+/// The hierarchy with `exact` outside and `rounded` on the finest level; groups, transfers and coarse levels are those of the
+/// symmetric `rows`.
 fn levels<const K: usize, const C: usize>(
     world: &World,
     (nodes, rows, tied): (&Nodes, &impl Rows<K>, &[bool]),

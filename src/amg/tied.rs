@@ -22,6 +22,11 @@ pub struct Ties<const K: usize> {
 }
 
 impl<const K: usize> Ties<K> {
+    /// Whether a node of any rank is tied. Collective.
+    pub fn are_there(&self, world: &World) -> bool {
+        world.sum_usize(usize::from(self.nodes.contains(&true))) > 0
+    }
+
     /// Adds the corrections of all ranks to the `rows` of the symmetric part. Collective. Error, the
     /// same on all ranks: a correction has no place among the entries.
     pub fn correct(&self, world: &World, nodes: &Nodes, rows: &mut BlockCsr<K>) -> Result<()> {

@@ -165,12 +165,15 @@ impl<T: Stored> Product for BlockProduct<T> {
 }
 
 impl BlockProduct<f64> {
-    /// A symmetric matrix in single precision, in the place of what `target` held.
-    pub fn round_into(&self, target: &mut BlockProduct<f32>) {
-        if let (Own::Symmetric(own), Own::Symmetric(target)) = (&self.own, &mut target.own) {
-            own.round_into(target);
+    /// In single precision, in the place of what `target` held, if that is symmetric where this is. Whether it is.
+    pub fn round_into(&self, target: &mut BlockProduct<f32>) -> bool {
+        match (&self.own, &mut target.own) {
+            (Own::Symmetric(own), Own::Symmetric(target)) => own.round_into(target),
+            (Own::Whole(own), Own::Whole(target)) => *target = own.rounded(),
+            _ => return false,
         }
         target.other = self.other.rounded();
+        true
     }
 }
 

@@ -2,7 +2,6 @@
 #![allow(dead_code)]
 
 use mpm_par::amg::level::BlockCsr;
-use mpm_par::amg::symmetric_part::symmetric_part;
 use mpm_par::amg::tied::Ties;
 use mpm_par::amg::{self, Hierarchy, Levelled, Levels};
 use mpm_par::blocks::BlockProduct;
@@ -158,14 +157,7 @@ impl<const D: usize> Levelled for Hardening<'_, D> {
         self.made[1] += 1;
         let rows = self.of_matrix(matrix)?;
         amg::fill::<_, D>(&rows, exact);
-        if self.symmetric {
-            exact.round_into(finest);
-            return Ok(());
-        }
-        let nodes = &self.share.nodes;
-        let (owned, global) = (nodes.owned, &nodes.global);
-        let part = symmetric_part(self.world, owned, global, &nodes.halo, &rows)?;
-        amg::fill::<_, D>(&part, finest);
+        exact.round_into(finest);
         Ok(())
     }
 }

@@ -142,7 +142,11 @@ impl<const D: usize, const N: usize> Levelled for Equilibrium<'_, D, N> {
                 exact.round_into(finest);
                 return Ok(());
             }
-            let part = amg::surrogate(self.world, self.numbering, rows, &self.ties(rows)?)?;
+            let ties = self.ties(rows)?;
+            if !ties.are_there(self.world) && exact.round_into(finest) {
+                return Ok(());
+            }
+            let part = amg::surrogate(self.world, self.numbering, rows, &ties)?;
             amg::fill::<_, N>(&part, finest);
             Ok(())
         })
