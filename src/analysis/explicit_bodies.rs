@@ -4,7 +4,7 @@
 //! Fields of bodies that no contact names together move as one at the nodes they share.
 
 use crate::contact::nodal::{Exchange, Meeting};
-use crate::contact::told::{self, Told};
+use crate::contact::point_state::{self, ContactState};
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
@@ -33,8 +33,8 @@ pub(super) struct AtNodes<'a> {
 }
 
 /// Adds the impulses at the `shared` nodes to the nodal acceleration and, as forces, to what has
-/// `pushed`; at owned nodes. One [`Met`] for each pair of bodies, this rank's share, and what points are
-/// told. Collective.
+/// `pushed`; at owned nodes. One [`Met`] for each pair of bodies, this rank's share, and the states of
+/// the points. Collective.
 pub(super) fn meet<const D: usize>(
     world: &World,
     model: &Model<D>,
@@ -43,10 +43,10 @@ pub(super) fn meet<const D: usize>(
     at: &AtNodes<'_>,
     acceleration: &mut [f64],
     pushed: &mut [[f64; D]],
-) -> Result<(Vec<Met>, Vec<Told<D>>)> {
+) -> Result<(Vec<Met>, Vec<ContactState<D>>)> {
     let pairs = &model.contacts.body_pairs;
     let mut met: Vec<Met> = pairs.iter().map(|pair| Met::of(pair.index)).collect();
-    let mut at_nodes = match model.contacts.tells {
+    let mut at_nodes = match model.contacts.keeps_state {
         true => vec![0.0; mesh.numbering.len() * (D + OTHERS)],
         false => Vec::new(),
     };
@@ -65,7 +65,7 @@ pub(super) fn meet<const D: usize>(
                     pushed[node][i] += share * class.impulse[i] / at.dt;
                     acceleration[node * D + i] += class.compliance[i] * class.impulse[i] / at.dt;
                 }
-                if let (true, Some(state)) = (model.contacts.tells, class.state) {
+                if let (true, Some(state)) = (model.contacts.keeps_state, class.state) {
                     let words = &mut at_nodes[node * (D + OTHERS)..][..D + OTHERS];
                     for (word, j) in words.iter_mut().zip(&class.impulse) {
                         *word = j / (at.dt * class.mass);
@@ -75,11 +75,11 @@ pub(super) fn meet<const D: usize>(
             }
         }
     }
-    let told = match model.contacts.tells {
-        true => told(world, model, mesh, points, at_nodes)?,
+    let states = match model.contacts.keeps_state {
+        true => states_of_points(world, model, mesh, points, at_nodes)?,
         false => Vec::new(),
     };
-    Ok((met, told))
+    Ok((met, states))
 }
 
 /// Words of a node behind the components of its force over its mass: gap, way slid times its share of the
@@ -89,22 +89,22 @@ const OTHERS: usize = 4;
 /// Share of the surface in a cell's side up to which a point is not said to be in contact.
 const HARDLY: f64 = 0.01;
 
-/// What nodes in contact tell the points that they move: of the force at a node each takes the share of
-/// its mass. Collective.
-fn told<const D: usize>(
+/// States of contact of the points around nodes in contact: each point takes the share of its mass in the force at
+/// a node. Collective.
+fn states_of_points<const D: usize>(
     world: &World,
     model: &Model<D>,
     mesh: &Discretisation<D>,
     points: &Points<D>,
     mut at_nodes: Vec<f64>,
-) -> Result<Vec<Told<D>>> {
+) -> Result<Vec<ContactState<D>>> {
     let width = D + OTHERS;
     mesh.numbering.halo.forward(world, &mut at_nodes, width)?;
     let step = mesh.step_points(points, &model.materials);
     let least = HARDLY * model.grid.cell_size().powi(D as i32 - 1);
-    let mut told = Vec::new();
+    let mut states = Vec::new();
     for point in 0..points.len() {
-        let mut one = Told { point, force: [0.0; D], gap: 0.0, slid: 0.0, status: 0.0 };
+        let mut one = ContactState { point, force: [0.0; D], gap: 0.0, slid: 0.0, status: 0.0 };
         let (mut slid, mut area) = (0.0, 0.0);
         for (&node, entry) in step.nodes_of(point).iter().zip(step.influences.row(point)) {
             let words = &at_nodes[node as usize * width..][..width];
@@ -124,13 +124,13 @@ fn told<const D: usize>(
             if area > least {
                 one.slid = slid / area;
             } else {
-                // A node that one body hardly reaches moves at will: its force alone is told.
+                // A node that one body hardly reaches moves at will: only its force is kept.
                 (one.gap, one.status) = (0.0, 0.0);
             }
-            told.push(one);
+            states.push(one);
         }
     }
-    Ok(told)
+    Ok(states)
 }
 
 /// Fields that move as one at a shared node.
@@ -204,7 +204,7 @@ impl<'a, const D: usize> Here<'a, D> {
         let along = dot(after, &meeting.normal);
         let slip = (0..D).map(|i| (after[i] - along * meeting.normal[i]).powi(2)).sum::<f64>();
         let slip = self.dt * slip.sqrt();
-        let status = if slip > STILL * cell { told::SLIDES } else { told::STICKS };
+        let status = if slip > STILL * cell { point_state::SLIDES } else { point_state::STICKS };
         for (class, sign) in both.iter().zip([-1.0, 1.0]) {
             let class = &mut self.classes[*class];
             for i in 0..D {

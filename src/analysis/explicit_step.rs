@@ -120,10 +120,10 @@ pub(crate) fn advance<const D: usize>(
     for (a, d) in acceleration.iter_mut().zip(&slowed) {
         *a -= d;
     }
-    let (mut met, mut told) = (Vec::new(), Vec::new());
+    let (mut met, mut states) = (Vec::new(), Vec::new());
     if let (false, GridMass::Lumped(mass)) = (model.contacts.body_pairs.is_empty(), &mass) {
         let at = AtNodes { mass, fixed: &conditions.fixed, velocity: &velocity, dt };
-        (met, told) = clock.time(Phase::Assemble, || {
+        (met, states) = clock.time(Phase::Assemble, || {
             meet(world, model, &mesh, (&*points, &shared), &at, &mut acceleration, &mut pushed)
         })?;
         nodes.carry(mesh.step_points(points, &model.materials), &mut acceleration)?;
@@ -188,7 +188,7 @@ pub(crate) fn advance<const D: usize>(
             update::respond(&model.materials, made.straining(), points, Some(before))
         });
         update::move_points(&made.displacement, points, Some(before));
-        let of_bodies = OfBodies { told: std::mem::take(&mut told), slips: Vec::new() };
+        let of_bodies = OfBodies { states: std::mem::take(&mut states), slips: Vec::new() };
         touching::keep(&model.contacts, touching.as_ref(), of_bodies, points, Some(before));
         before.velocity.replace(&mut points.velocity, new_velocity);
         before.acceleration.replace(&mut points.acceleration, rate);

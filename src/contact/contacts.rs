@@ -10,9 +10,9 @@ use super::half_space::HalfSpace;
 use super::law::{Friction, Law};
 use super::motion::{Motion, When};
 use super::outline::Outline;
+use super::point_state;
 use super::pose::Pose;
 use super::surface::{Surface, length};
-use super::told;
 use super::triangles::Triangles;
 use crate::basis::Domain;
 use crate::deck::model::{self, AnalysisType, Basis, Partner, RigidShape, Symmetry};
@@ -82,7 +82,7 @@ pub struct Contacts<const D: usize> {
     /// Points are sections of rings: axisymmetry.
     pub rings: bool,
     /// Points keep what the fields `contact_*` show.
-    pub tells: bool,
+    pub keeps_state: bool,
 }
 
 impl<const D: usize> Contacts<D> {
@@ -123,7 +123,14 @@ impl<const D: usize> Contacts<D> {
             _ => joined_fields(deck, &body_pairs, nodes)?,
         };
         let rings = deck.analysis.symmetry == Symmetry::Axisymmetric;
-        Ok(Contacts { rigids, pairs, body_pairs, fields, rings, tells: told::is_wanted(deck) })
+        Ok(Contacts {
+            rigids,
+            pairs,
+            body_pairs,
+            fields,
+            rings,
+            keeps_state: point_state::is_wanted(deck),
+        })
     }
 
     /// Whether no body touches a rigid one.
@@ -167,7 +174,7 @@ impl<const D: usize> Contacts<D> {
 
     /// Names of the words that the points of each body carry: elastic slip, of contacts with rigid bodies by
     /// corners and of those with other bodies by elements, of which they carry at most so many (`carried`, 0 in
-    /// explicit runs), and what they are told.
+    /// explicit runs), and the state of contact for the fields `contact_*`.
     pub fn slip_names(&self, deck: &Deck, carried: &[usize]) -> Vec<Vec<String>> {
         let corners = corners_of(deck.method.basis, D);
         let words = |name: String, count: usize| {
@@ -181,8 +188,8 @@ impl<const D: usize> Contacts<D> {
                 .flat_map(|pair| words(format!("body.{}", pair.index), carried[body]));
             let touching = self.pairs.iter().any(|pair| pair.body == body)
                 || self.body_pairs.iter().any(|pair| pair.bodies.contains(&body));
-            let told = (self.tells && touching).then(|| told::names(D));
-            slips.chain(elements).chain(told.into_iter().flatten()).collect()
+            let state = (self.keeps_state && touching).then(|| point_state::names(D));
+            slips.chain(elements).chain(state.into_iter().flatten()).collect()
         };
         (0..deck.bodies.len()).map(of_body).collect()
     }

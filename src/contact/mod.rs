@@ -23,7 +23,7 @@
 //! | velocity fields of bodies that touch each other | [`Fields`](fields::Fields) | `fields.rs` |
 //! | the plane between two bodies | [`separate`](separator::separate) | `separator.rs` |
 //! | impulses between two fields at a node | [`Meeting`](nodal::Meeting) | `nodal.rs` |
-//! | what points are told for fields `contact_*` | [`Told`](told::Told) | `told.rs` |
+//! | the state of contact of a point, for the fields `contact_*` | [`ContactState`](point_state::ContactState) | `point_state.rs` |
 //! | the rigid bodies and contacts of a deck | [`Contacts`] | `contacts.rs` |
 //!
 //! A new surface is one file that implements [`Surface`](surface::Surface) and one line of `contacts.rs`. The forces
@@ -43,12 +43,12 @@ pub(crate) mod law;
 pub(crate) mod motion;
 pub(crate) mod nodal;
 pub(crate) mod outline;
+pub(crate) mod point_state;
 pub(crate) mod pose;
 pub(crate) mod separator;
 pub(crate) mod solid;
 pub(crate) mod start;
 pub(crate) mod surface;
-pub(crate) mod told;
 pub(crate) mod triangles;
 
 pub use contacts::{Contacts, Pair};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::basis::Domain;
 use crate::contact::Contacts;
-use crate::contact::told::PREFIX;
+use crate::contact::point_state::PREFIX;
 use crate::deck::expression::Expression;
 use crate::deck::model::{self, Initial, Load};
 use crate::deck::{Deck, Presence};

@@ -272,7 +272,7 @@ fn gather<const D: usize>(
         for &p in groups.points(group) {
             let corners = DomainCorners::of(model.deck.method.basis, contacts.rings, points, p);
             let volume = points.volume(p);
-            let mut tell = |node: usize, reaches: bool, surface: [f64; D]| {
+            let mut report = |node: usize, reaches: bool, surface: [f64; D]| {
                 let one = Seen {
                     node,
                     body: points.body[p] as usize,
@@ -301,9 +301,9 @@ fn gather<const D: usize>(
                 surface[0] += volume * influences.hoop.get(entry).copied().unwrap_or(0.0);
                 let node = numbering.nodes[local];
                 far.retain(|other| *other != node);
-                tell(node, true, surface);
+                report(node, true, surface);
             }
-            far.iter().for_each(|&node| tell(node, false, [0.0; D]));
+            far.iter().for_each(|&node| report(node, false, [0.0; D]));
         }
     }
     for (_, words) in exchange(world, outgoing.into_iter().collect())? {

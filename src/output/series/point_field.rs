@@ -8,7 +8,7 @@
 
 use nalgebra::Matrix3;
 
-use crate::contact::told;
+use crate::contact::point_state;
 use crate::deck::fields::{self, FieldRank};
 use crate::error::{Error, Result};
 use crate::material::{StateVariable, state_variables};
@@ -227,10 +227,10 @@ impl PointField {
             PointField::Jacobian => out.push(jacobian()),
             PointField::Volume => out.push(points.volume(p)),
             PointField::Mass => out.push(points.mass[p]),
-            PointField::ContactForce => out.extend(told::FORCE.map(&of_contact)),
-            PointField::ContactGap => out.push(of_contact(told::GAP)),
-            PointField::ContactSlip => out.push(of_contact(told::SLIP)),
-            PointField::ContactStatus => out.push(of_contact(told::STATUS)),
+            PointField::ContactForce => out.extend(point_state::FORCE.map(&of_contact)),
+            PointField::ContactGap => out.push(of_contact(point_state::GAP)),
+            PointField::ContactSlip => out.push(of_contact(point_state::SLIP)),
+            PointField::ContactStatus => out.push(of_contact(point_state::STATUS)),
             PointField::Id => out.push(points.id[p] as f64),
             PointField::Body => out.push(f64::from(points.body[p])),
             PointField::Rank => out.push(0.0),

@@ -13,8 +13,8 @@ use std::sync::Arc;
 use crate::contact::Contacts;
 use crate::contact::Near;
 use crate::contact::law::{Friction, Law, Reached, Response};
+use crate::contact::point_state::{ContactState, SLIDES, STICKS};
 use crate::contact::surface::length;
-use crate::contact::told::{SLIDES, STICKS, Told};
 use crate::points::Points;
 use crate::system::border::Border;
 use crate::system::facing::{Couple, DEEPEST};
@@ -208,7 +208,7 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
     ) -> (Vec<Met>, OfBodies<D>) {
         let pairs = self.contacts.body_pairs.iter();
         let mut met: Vec<Met> = pairs.map(|pair| Met::of(pair.index)).collect();
-        let mut kept = OfBodies { told: Vec::new(), slips: self.no_slips(model, points) };
+        let mut kept = OfBodies { states: Vec::new(), slips: self.no_slips(model, points) };
         for (k, of) in self.couples.iter().enumerate() {
             let (gap, end) = self.at_end(k, displacement);
             let start = &self.starts[k];
@@ -235,12 +235,18 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
                 let (back, _) = inverse::<D>(&block(&points.deformation_gradient[of.point]));
                 kept.slips.push((of.point, start.slot, apply(&back, &whole)));
             }
-            if self.contacts.tells {
+            if self.contacts.keeps_state {
                 // Its whole area, as the other half is that of the other body's elements.
                 let force = response.traction.map(|t| 2.0 * of.area * t);
                 let slides = slid > STILL * (held + gap.abs()) || law.friction == Friction::Smooth;
                 let status = if slides { SLIDES } else { STICKS };
-                kept.told.push(Told { point: of.point, force, gap: gap.min(0.0), slid, status });
+                kept.states.push(ContactState {
+                    point: of.point,
+                    force,
+                    gap: gap.min(0.0),
+                    slid,
+                    status,
+                });
             }
         }
         (met, kept)

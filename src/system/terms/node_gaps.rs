@@ -63,7 +63,7 @@ mod tests {
         let node = |i: u32| [f64::from(i % 9) - 4.0, f64::from(i / 9) - 4.0];
         let places: Vec<[f64; 2]> = (0..81).map(node).collect();
         let gaps = places.iter().map(|x| ball.near(x).gap).collect();
-        let (nodes, mut told, mut far) = (NodeGaps { places, gaps }, 0, 0);
+        let (nodes, mut known, mut far) = (NodeGaps { places, gaps }, 0, 0);
         for k in 0..4000 {
             let of = |step: f64| 8.0 * (step * f64::from(k)).fract() - 4.0;
             let (x, reach) = ([of(0.618_033_988), of(0.754_877_666)], 0.1 + of(0.569).abs() / 8.0);
@@ -71,9 +71,9 @@ mod tests {
             let truly = ball.near(&x).gap > reach;
             let said = nodes.beyond(first, &x, reach);
             assert!(truly || !said, "{x:?} {reach}");
-            told += usize::from(said);
+            known += usize::from(said);
             far += usize::from(truly);
         }
-        assert!(told * 2 > far && told < far, "{told} of {far}");
+        assert!(known * 2 > far && known < far, "{known} of {far}");
     }
 }

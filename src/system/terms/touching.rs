@@ -3,8 +3,8 @@
 
 use crate::contact::Contacts;
 use crate::contact::law::{Friction, Law, Response};
+use crate::contact::point_state::{self, ContactState, write_states};
 use crate::contact::surface::length;
-use crate::contact::told::{self, Told, tell};
 use crate::points::{Points, Snapshot};
 
 /// Slip, of the elastic slip and the depth, up to which a corner sticks: round-off.
@@ -78,7 +78,7 @@ pub struct Finished<const D: usize> {
     /// Point, first word, elastic slip in the rigid body's frame.
     slips: Vec<(usize, usize, [f64; D])>,
     /// For the fields `contact_*`, if the deck asks for them.
-    told: Option<Vec<Told<D>>>,
+    states: Option<Vec<ContactState<D>>>,
 }
 
 /// What two bodies exchange in a step, this rank's share.
@@ -129,7 +129,7 @@ impl<const D: usize> Finished<D> {
             dissipation: 0.0,
             work: 0.0,
             slips: Vec::new(),
-            told: contacts.tells.then(Vec::new),
+            states: contacts.keeps_state.then(Vec::new),
         }
     }
 
@@ -144,11 +144,11 @@ impl<const D: usize> Finished<D> {
         let stiffness = of.share * law.penalty * of.area;
         self.energy += 0.5 * stiffness * (gap * gap + held * held);
         self.dissipation += stiffness * held * slid;
-        if let Some(told) = &mut self.told {
+        if let Some(states) = &mut self.states {
             let force = response.traction.map(|t| of.area * t);
             let slides = slid > STILL * (held + gap.abs()) || law.friction == Friction::Smooth;
-            let status = if slides { told::SLIDES } else { told::STICKS };
-            told.push(Told { point: of.point, force, gap: gap.min(0.0), slid, status });
+            let status = if slides { point_state::SLIDES } else { point_state::STICKS };
+            states.push(ContactState { point: of.point, force, gap: gap.min(0.0), slid, status });
         }
     }
 
@@ -163,7 +163,7 @@ impl<const D: usize> Finished<D> {
 #[derive(Debug, Default)]
 pub struct OfBodies<const D: usize> {
     /// For the fields `contact_*`.
-    pub told: Vec<Told<D>>,
+    pub states: Vec<ContactState<D>>,
     /// Point, first word, elastic slip as points keep it; of several for one word the last counts.
     pub slips: Vec<(usize, usize, [f64; D])>,
 }
@@ -188,6 +188,6 @@ pub fn keep<const D: usize>(
         let body = points.body[*p];
         points.slip.of_mut(*p, body)[*slot..*slot + D].copy_from_slice(slip);
     }
-    let of_rigids = touching.and_then(|touching| touching.told.as_ref()).into_iter().flatten();
-    tell(contacts, points, of_rigids.copied().chain(of_bodies.told));
+    let of_rigids = touching.and_then(|touching| touching.states.as_ref()).into_iter().flatten();
+    write_states(contacts, points, of_rigids.copied().chain(of_bodies.states));
 }

@@ -1,4 +1,4 @@
-//! What contact does to points, for the fields `contact_*`: words behind the elastic slip of a point.
+//! The state of contact of a point, for the fields `contact_*`: numbers behind its elastic slip.
 
 use super::Contacts;
 use crate::deck::Deck;
@@ -18,9 +18,9 @@ const OTHERS: [&str; 3] = [GAP, SLIP, STATUS];
 pub const STICKS: f64 = 1.0;
 pub const SLIDES: f64 = 2.0;
 
-/// What one corner or one node tells a point of a step.
+/// The state of contact of one corner or node of a point at the end of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Told<const D: usize> {
+pub struct ContactState<const D: usize> {
     pub point: usize,
     /// On the point's body, N.
     pub force: [f64; D],
@@ -44,14 +44,14 @@ pub fn names(dimension: usize) -> impl Iterator<Item = String> {
     FORCE[..dimension].iter().chain(&OTHERS).map(|name| name.to_string())
 }
 
-/// Gives the points of bodies in contact what they have been told; forces of one point add up, of
+/// Writes the states to the points of bodies in contact; forces of one point add up, of
 /// gaps the smallest counts, and slip goes on from step to step.
-pub fn tell<const D: usize>(
+pub fn write_states<const D: usize>(
     contacts: &Contacts<D>,
     points: &mut Points<D>,
-    told: impl Iterator<Item = Told<D>>,
+    states: impl Iterator<Item = ContactState<D>>,
 ) {
-    if !contacts.tells {
+    if !contacts.keeps_state {
         return;
     }
     let words = D + OTHERS.len();
@@ -66,17 +66,17 @@ pub fn tell<const D: usize>(
         }
     }
     let mut slid = vec![0.0f64; points.len()];
-    for one in told {
-        let body = points.body[one.point];
+    for state in states {
+        let body = points.body[state.point];
         let Some(own) = first[body as usize] else { continue };
-        let row = &mut points.slip.of_mut(one.point, body)[own..own + words];
-        for (sum, force) in row.iter_mut().zip(&one.force) {
+        let row = &mut points.slip.of_mut(state.point, body)[own..own + words];
+        for (sum, force) in row.iter_mut().zip(&state.force) {
             *sum += force;
         }
-        row[D] = row[D].min(one.gap);
-        let before = slid[one.point];
-        slid[one.point] = before.max(one.slid);
-        row[D + 1] += slid[one.point] - before;
-        row[D + 2] = row[D + 2].max(one.status);
+        row[D] = row[D].min(state.gap);
+        let before = slid[state.point];
+        slid[state.point] = before.max(state.slid);
+        row[D + 1] += slid[state.point] - before;
+        row[D + 2] = row[D + 2].max(state.status);
     }
 }
