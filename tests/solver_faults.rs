@@ -119,6 +119,18 @@ fn nonlinear_solvers_that_do_not_suit() {
     }
 }
 
+/// A line search that ends the iteration by a measure of its own has not met the tolerance.
+#[test]
+fn a_line_search_does_not_judge_the_step() {
+    let run = with("-qs_snes_linesearch_type cp -qs_snes_linesearch_atol 1e300");
+    for ranks in [1, 2] {
+        let outcome = run.clone().ranks(ranks).attempt();
+        let said = outcome.said();
+        assert_eq!(outcome.code, 1, "{said}");
+        assert!(said.contains("the line search ended the iteration above the tolerance"), "{said}");
+    }
+}
+
 #[test]
 fn values_that_petsc_refuses() {
     let message =

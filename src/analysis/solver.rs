@@ -223,7 +223,8 @@ impl Search {
         match self {
             Search::None => &[],
             Search::Wide => &[("snes_linesearch_type", "bt"), ("snes_linesearch_alpha", GROWTH)],
-            Search::Root => &[("snes_linesearch_type", "cp")],
+            // Forces along the direction have no scale that PETSc knows.
+            Search::Root => &[("snes_linesearch_type", "cp"), ("snes_linesearch_atol", "0")],
             Search::Falling => &[("snes_linesearch_type", "bt"), ("snes_linesearch_alpha", "1e-4")],
         }
     }

@@ -118,6 +118,8 @@ struct Context<'a, P> {
     forcing: Option<Forcing>,
     solver: &'a Ksp,
     error: Option<Error>,
+    /// The last verdict of all ranks was `Verdict::Converged`.
+    met: bool,
     /// The reason given with `Verdict::Diverged`.
     diverged: Option<String>,
     /// The last residual was asked for outside its domain.
@@ -208,6 +210,7 @@ impl Snes {
             forcing: self.forcing.clone(),
             solver: &self.solver,
             error: None,
+            met: false,
             diverged: None,
             outside: false,
             linear_solves: 0,
@@ -243,11 +246,19 @@ impl Snes {
             petsc!(SNESGetConvergedReason(self.raw, &mut reason))?;
             petsc!(SNESGetConvergedReasonString(self.raw, &mut text))?;
         }
-        let at_zero = reason == sys::SNES_DIVERGED_LINE_SEARCH && self.residual_is_zero()?;
-        let converged = reason > 0 || (at_zero && context.judge_again(self.raw)?);
+        // Line searches may end the iteration as converged by measures of their own.
+        let by_search = reason > 0 && !context.met;
+        let searched = by_search || reason == sys::SNES_DIVERGED_LINE_SEARCH;
+        let at_zero = searched && self.residual_is_zero()?;
+        let converged =
+            (reason > 0 && context.met) || (at_zero && context.judge_again(self.raw)?);
         let linear_failure = !converged && reason == sys::SNES_DIVERGED_LINEAR_SOLVE;
         let reason = match (context.diverged, context.linear_failure) {
             _ if converged => "converged".to_owned(),
+            _ if by_search => format!(
+                "the line search ended the iteration above the tolerance ({})",
+                text_of(text)
+            ),
             // Line searches have their own word for it.
             _ if context.outside => "DIVERGED_FUNCTION_DOMAIN".to_owned(),
             (Some(why), _) => why,
@@ -451,6 +462,7 @@ unsafe extern "C" fn assess<P: NewtonProblem>(
                 sys::SNES_DIVERGED_INNER
             }
         };
+        context.met = word == sys::SNES_CONVERGED_FNORM_ABS;
         // SAFETY: PETSc passes the place for the answer.
         unsafe { *reason = word };
         Ok(())

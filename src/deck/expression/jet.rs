@@ -87,6 +87,10 @@ impl Algebra for Averaged {
     }
 
     fn function(&self, place: usize, a: Dual) -> Dual {
+        // Derivatives that are infinite here do not act on what does not vary.
+        if Jet::from(a).is_constant() {
+            return Dual::from_re(FUNCTIONS[place].1(a.re));
+        }
         match (SMOOTH_OF[place], FUNCTIONS[place].0) {
             (Some(smooth), _) => smooth(&a),
             (None, "abs") => self.max(a, -a),
@@ -109,9 +113,31 @@ impl Algebra for Averaged {
     }
 }
 
-/// a^b. A constant exponent keeps whole powers exact at and below zero.
+/// a^b. A constant exponent keeps whole powers exact at and below zero; a factor that vanishes wins over 0^-1, as the
+/// derivatives of x and x^2 exist at zero.
 fn power(a: Dual, b: Dual) -> Dual {
-    if Jet::from(b).is_constant() { a.powf(b.re) } else { a.powd(b) }
+    if !Jet::from(b).is_constant() {
+        return a.powd(b);
+    }
+    let (x, n) = (a.re, b.re);
+    let term = |factor: f64, n: f64| if factor == 0.0 { 0.0 } else { factor * x.powf(n) };
+    chained(a, [x.powf(n), term(n, n - 1.0), term(n * (n - 1.0), n - 2.0)])
+}
+
+/// tanh without the quotient of two functions that overflow.
+fn tanh(a: &Dual) -> Dual {
+    let t = a.re.tanh();
+    let slope = 1.0 - t * t;
+    chained(*a, [t, slope, -2.0 * t * slope])
+}
+
+/// f(a), where `f` has its value, first and second derivative at a.
+fn chained(a: Dual, f: [f64; 3]) -> Dual {
+    if Jet::from(a).is_constant() {
+        return Dual::from_re(f[0]);
+    }
+    let varying = a - a.re;
+    varying * varying * (0.5 * f[2]) + varying * f[1] + f[0]
 }
 
 /// atan2(y, x), away from the origin.
@@ -146,7 +172,7 @@ pub const RULES: [(&str, Smooth); 19] = [
     ("sinh", Dual::sinh),
     ("sqrt", Dual::sqrt),
     ("tan", Dual::tan),
-    ("tanh", Dual::tanh),
+    ("tanh", tanh),
 ];
 
 /// The rule of each of [`FUNCTIONS`].

@@ -124,6 +124,9 @@ fn derivatives_of_a_power_exist_at_zero_and_below() {
         ("X^1", 0.0, [0.0, 1.0, 0.0]),
         ("X^0", 0.0, [1.0, 0.0, 0.0]),
         ("X^-1", -2.0, [-0.5, -0.25, -0.25]),
+        ("X^2.5", 0.0, [0.0, 0.0, 0.0]),
+        ("tanh(1000*X)", 1.0, [1.0, 0.0, 0.0]),
+        ("sqrt(0*X) + (0*X)^1.5 + X", 2.0, [2.0, 1.0, 0.0]),
     ] {
         let found = jet(text, x, 0.0);
         assert_eq!([found.value, found.first[0], found.second_along(0, 0)], expected, "{text}");
