@@ -135,6 +135,27 @@ fn resolved_deck_reads_back_to_the_same_deck() {
     assert_eq!(implicit, read(&deck::resolved(&implicit), &[]));
 }
 
+/// Every deck of `inputs/`, with a resolved deck that the next restart and the next reader take for it.
+#[test]
+fn resolved_decks_of_all_inputs_read_back_to_them() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("inputs");
+    let mut count = 0;
+    for entry in std::fs::read_dir(folder).expect("inputs/") {
+        let path = entry.expect("a file").path();
+        if path.extension().is_none_or(|ending| ending != "toml") {
+            continue;
+        }
+        let text = std::fs::read_to_string(&path).expect("text");
+        let read = |text: &str| {
+            deck::read(&path, text, &[]).unwrap_or_else(|error| panic!("{error}\n{text}"))
+        };
+        let (first, again) = (read(&text), read(&deck::resolved(&read(&text))));
+        assert_eq!(Deck { notes: first.notes.clone(), ..again }, first, "{}", path.display());
+        count += 1;
+    }
+    assert!(count > 50, "{count} decks");
+}
+
 #[test]
 fn resolved_deck_tells_every_default() {
     for text in DECKS {

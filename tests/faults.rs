@@ -289,6 +289,8 @@ fn formulas_without_a_value_at_the_start() {
     for words in ["load.0.manufactured: ", "\n 43 | manufactured = "] {
         assert!(outcome.stderr.contains(words), "{}", outcome.stderr);
     }
+    // The key is told once.
+    assert!(!outcome.stderr.contains("load.manufactured"), "{}", outcome.stderr);
     let explicit = block().set("analysis={ type = \"explicit\", steps = 10, duration = 1e-3 }");
     refused(
         &explicit.set("body.0.velocity=[0, \"ln(0.5 - X)\"]"),

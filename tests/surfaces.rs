@@ -752,6 +752,11 @@ fn files_that_bound_no_body_are_refused() {
     says(&twice, "cut each other");
     let outcome = with_file(&SOLID.replace("ball.stl", "none.stl"), "ball.stl", "");
     assert!(outcome.code == 2 && outcome.said().contains("cannot be read"), "{}", outcome.said());
+    // So small that the volume vanishes: the file is good, its scale is not.
+    let tiny = SOLID.replace("stl = \"ball.stl\"", "stl = \"ball.stl\", scale = 1e-300");
+    let said = with_file(&tiny, "ball.stl", &stl(&good)).said();
+    assert!(said.contains("shape.scale: 1e-300 makes the surface"), "{said}");
+    assert!(!said.contains("face inward"), "{said}");
 }
 
 /// A rigid body takes no file that bounds none, and no load acts on a body that has gone.
@@ -798,6 +803,80 @@ fn what_contacts_and_loads_cannot_act_on_is_refused() {
         said.contains("after that has gone with stage") && said.contains("until = \"one\""),
         "{said}"
     );
+}
+
+/// A bar that is propped in its second stage.
+const PROPPED_BAR: &str = r#"
+[analysis]
+type = "quasi-static"
+[[stage]]
+name = "loaded"
+steps = 2
+[[stage]]
+name = "propped"
+steps = 4
+[[stage]]
+name = "free"
+steps = 1
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+origin = [-0.5, -0.5]
+size = [2.0, 2.0]
+h = 0.25
+[material.m]
+model = "hencky"
+young = 1e6
+poisson = 0.2
+[[body]]
+name = "bar"
+material = "m"
+shape = { box = { min = [0.1, 0.07], max = [1.1, 1.07] } }
+[[boundary]]
+name = "foot"
+surface = { side = "bottom" }
+[[boundary]]
+name = "prop"
+surface = { side = "top" }
+displacement = { y = "-1e-4*s" }
+from = "propped"
+until = "free"
+[[load]]
+traction = { side = "top", value = [0.0, -100.0] }
+until = "propped"
+"#;
+
+/// The deck with all defaults says from when and until when a surface is held, and reads back to the deck.
+#[test]
+fn the_resolved_deck_tells_when_a_surface_is_held() {
+    let read = |text: &str| {
+        let sets: Vec<String> = Vec::new();
+        mpm_par::deck::read(std::path::Path::new("deck.toml"), text, &sets)
+            .unwrap_or_else(|error| panic!("{error}\n{text}"))
+    };
+    let deck = read(PROPPED_BAR);
+    assert_eq!(read(&mpm_par::deck::resolved(&deck)), deck);
+}
+
+/// A support of a later stage whose displacement has no value there is named before the first step.
+#[test]
+fn a_later_support_without_a_value_is_named_at_the_start() {
+    let refused = |formula: &str, words: &[&str]| {
+        let outcome = Run::text(&PROPPED_BAR.replace("-1e-4*s", formula)).word("--check").attempt();
+        let said = outcome.said();
+        assert_eq!(outcome.code, 2, "{formula}: {said}");
+        assert!(words.iter().all(|word| said.contains(word)), "{formula}: {said}");
+    };
+    let key = "boundary.1.displacement.y: is NaN m at [";
+    refused("-1e-4*log(s-2)", &[key, "s = 0 of stage \"propped\"", "not finite"]);
+    // At the end of its first step: s = 1/4, t = 1.25.
+    refused("if(s > 0.2, sqrt(-s), s)", &[key, "s = 0.25 of stage \"propped\""]);
+    refused("1e-4*s*sqrt(1.1-t)", &[key, "s = 0.25 of stage \"propped\""]);
+    // What has no value before its stage has one in it.
+    let good = PROPPED_BAR.replace("-1e-4*s", "-1e-4*s*sqrt(t-0.5)");
+    let outcome = Run::text(&good).word("--check").attempt();
+    assert_eq!(outcome.code, 0, "{}", outcome.said());
 }
 
 /// A run does not go on with another file of triangles under the name of the first one.

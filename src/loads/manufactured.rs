@@ -29,7 +29,11 @@ impl Declaration for MadeField {
     };
 
     fn read(table: &Table<'_>, around: &Around<'_>) -> Got<Self> {
-        expressions(table, "manufactured", around.dimension).map(MadeField)
+        let field = expressions(table, "manufactured", around.dimension)?;
+        match field.iter().find_map(|component| component.smooth().err()) {
+            Some(why) => Err(table.problem("manufactured", why)),
+            None => Ok(MadeField(field)),
+        }
     }
 
     fn written(&self, _bodies: &[Body]) -> String {
@@ -104,8 +108,8 @@ impl Manufactured {
         let (contribution, state) = mechanics::contribution(Frame::Total, &start, &gradient);
         if state.plastic_increment > 0.0 || !state.stored_energy.is_finite() {
             return Err(Error::Input(format!(
-                "load.manufactured: at X = {:?}, s = {} the field {}; a manufactured solution \
-                 must stay elastic and invertible",
+                "at X = {:?}, s = {} the manufactured field {}; a manufactured solution must stay \
+                 elastic and invertible",
                 &scope.initial[..D],
                 scope.load_factor,
                 if state.plastic_increment > 0.0 {

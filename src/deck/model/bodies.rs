@@ -193,3 +193,31 @@ pub enum Seeding {
     /// Gauss points per axis and cell.
     Gauss(usize),
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::deck::schema;
+    use crate::material::CATALOGUE;
+
+    /// The reference names all that a strength reduction divides.
+    #[test]
+    fn the_reference_lists_what_a_strength_reduction_divides() {
+        let analysis = schema::section("analysis");
+        let doc = analysis.key("strength_tolerance").expect("a key").doc;
+        for parameter in CATALOGUE.iter().flat_map(|entry| entry.parameters) {
+            let key = parameter.key;
+            if strength_of(key).is_none() {
+                continue;
+            }
+            let named = match key {
+                "yield" | "yield_stress" => "yield stresses",
+                "shear_strength" => "shear strengths",
+                "cohesion" | "tension" => &format!("{key}s"),
+                key if key.starts_with("softening.") => "residual values",
+                key => key,
+            };
+            assert!(doc.contains(named), "{key}: {named} is not in: {doc}");
+        }
+    }
+}

@@ -14,6 +14,7 @@ pub(super) fn conditions(w: &mut Writer<'_>, deck: &Deck) {
         let place = match &boundary.place {
             Place::Surface(support) => {
                 supported(w, deck, boundary, support);
+                presence(w, "boundary", boundary.presence, Some(0));
                 continue;
             }
             Place::Side { axis, upper } => ("side", quote(SIDES[2 * axis + usize::from(*upper)])),

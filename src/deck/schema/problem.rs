@@ -113,7 +113,7 @@ pub const SECTIONS: &[Section] = &[
                 .range(between(-1.0 / 3.0, 0.0))
                 .read_by(&[IMPLICIT_DYNAMIC]),
             key("strength_tolerance", Number, Default("0.005"),
-                "Strength reduction: relative width of the bracket that ends the search. The run first goes through its steps, or stages, with the strength as it is; then cohesions, tensions, shear strengths and yield stresses, and the tangents of friction and dilation angles, are divided by a factor that grows until no equilibrium is found in a single step (Newton's method fails, or the displacement jumps: a node moves by more than a cell, or by a hundred times as much per relative change of the factor as in the calmest trial), and the bracket is halved. The middle is strength_factor of summary.json.")
+                "Strength reduction: relative width of the bracket that ends the search. The run first goes through its steps, or stages, with the strength as it is; then cohesions, tensions, shear strengths and yield stresses, their growth (`hardening`, `saturation.stress`) and residual values, and the tangents of friction and dilation angles, are divided by a factor that grows until no equilibrium is found in a single step (Newton's method fails, or the displacement jumps: a node moves by more than a cell, or by a hundred times as much per relative change of the factor as in the calmest trial), and the bracket is halved. The middle is strength_factor of summary.json.")
                 .range(super::Range { low_included: false, ..between(0.0, 1.0) })
                 .read_by(&[STRENGTH_REDUCTION]),
             key("damping", Table("analysis.damping"), Optional("none"),

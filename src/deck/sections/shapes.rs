@@ -109,9 +109,23 @@ fn form(
 /// The solid of the file that key `stl` names.
 pub fn of_stl(table: &Table<'_>, directory: &Path) -> Got<Arc<Solid>> {
     let (path, scale) = (directory.join(table.text("stl")?), table.number_if("scale")?);
-    let made = content(&path, input_file::DATA)
-        .and_then(|bytes| stl::read(&bytes))
-        .and_then(|triangles| Solid::scaled(&path, triangles, scale.unwrap_or(1.0)));
+    let made = content(&path, input_file::DATA).and_then(|bytes| stl::read(&bytes));
+    let made = match (made, scale) {
+        (Ok(triangles), Some(scale)) => {
+            let scaled = Solid::scaled(&path, &triangles, scale);
+            if scaled.is_err() && Solid::scaled(&path, &triangles, 1.0).is_ok() {
+                let why = format!(
+                    "{scale:e} makes the surface of {} too small or too large for its areas and \
+                     volume to be computed: expected what turns the file's lengths into m, as \
+                     0.001 for mm",
+                    path.display()
+                );
+                return Err(table.problem("scale", why));
+            }
+            scaled
+        }
+        (made, _) => made.and_then(|triangles| Solid::scaled(&path, &triangles, 1.0)),
+    };
     solid(table, "stl", &path, made)
 }
 

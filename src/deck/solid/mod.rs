@@ -65,9 +65,9 @@ impl Solid {
     }
 
     /// Of a file whose lengths are `1 / scale` times those of the deck. Errors as of [`Solid::new`].
-    pub fn scaled(path: &Path, triangles: Vec<[Place; 3]>, scale: f64) -> Result<Self, String> {
-        let larger = |corners: [Place; 3]| corners.map(|place| place.map(|x| x * scale));
-        let triangles = triangles.into_iter().map(larger).collect();
+    pub fn scaled(path: &Path, triangles: &[[Place; 3]], scale: f64) -> Result<Self, String> {
+        let larger = |corners: &[Place; 3]| corners.map(|place| place.map(|x| x * scale));
+        let triangles = triangles.iter().map(larger).collect();
         Ok(Solid { scale, ..Solid::new(path, None, triangles)? })
     }
 

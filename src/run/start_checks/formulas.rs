@@ -3,6 +3,7 @@
 
 use crate::deck::model::{AnalysisType, Boundary, Deck, Place, Symmetry};
 use crate::deck::schema::AXES;
+use crate::deck::stage::begin_of;
 use crate::deck::{Presence, When, figure};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -49,6 +50,16 @@ fn first_span(deck: &Deck) -> StepSpan {
     }
 }
 
+/// The first step of a later stage; with a step that follows the stability limit only its begin.
+fn first_of_stage(deck: &Deck, stage: usize) -> StepSpan {
+    let begin = begin_of(&deck.stages, stage);
+    let known = deck.stages.get(stage);
+    let factor_end = known.and_then(|stage| stage.steps).map_or(0.0, |steps| 1.0 / steps as f64);
+    let duration = known.and_then(|stage| stage.duration).unwrap_or(1.0);
+    let time_end = begin + factor_end * duration;
+    StepSpan { stage, factor_start: 0.0, factor_end, time_start: begin, time_end }
+}
+
 fn velocities<const D: usize>(world: &World, deck: &Deck, points: &Points<D>) -> Result<()> {
     let fault = |p: usize| (0..D).find(|&a| !points.velocity[p][a].is_finite());
     let message = of_first_point(world, points, fault, |p, axis| {
@@ -82,6 +93,11 @@ fn boundaries<const D: usize>(
         {
             let key = format!("boundary.{index}.where.box");
             return Err(Error::Input(deck.places.say(&key, &why)));
+        }
+        if let Some(from) = boundary.presence.from.filter(|from| *from > 0)
+            && boundary.support().is_some()
+        {
+            prescribed(model, index, first_of_stage(deck, from))?;
         }
         if !at_start(boundary) {
             continue;
@@ -132,19 +148,24 @@ fn boundaries<const D: usize>(
     Ok(warnings)
 }
 
-/// An error where the displacement of a support is not finite at an end of the first step; alike on all
-/// ranks.
+/// An error where the displacement of a support is not finite at an end of the first step in which it is
+/// there; alike on all ranks.
 fn prescribed<const D: usize>(model: &Model<D>, index: usize, span: StepSpan) -> Result<()> {
     let kind = model.deck.analysis.kind;
     for support in model.supports.iter().filter(|support| support.boundary == index) {
         for (s, t) in [(span.factor_start, span.time_start), (span.factor_end, span.time_end)] {
-            let when = When { stage: 0, factor: s, time: t };
-            let at = Moment::new(kind, Presence::default(), when);
+            // As in the stage that it comes with: its s is that stage's.
+            let at = Moment::new(kind, Presence::default(), When { stage: 0, factor: s, time: t });
+            let stage = match span.stage {
+                0 => String::new(),
+                later => format!(" of stage \"{}\"", model.deck.stages[later].name),
+            };
             for own in support.surface.elements() {
                 let u = support.prescribed(&own.element, at);
                 if let Some(axis) = u.iter().position(|u| !u.is_finite()) {
                     let why = format!(
-                        "is {} m at {:?} m on the surface, s = {s}: the expression is not finite there",
+                        "is {} m at {:?} m on the surface, s = {s}{stage}: the expression is not finite \
+                         there",
                         u[axis], own.element.place
                     );
                     let key = format!("boundary.{index}.displacement.{}", AXES[axis]);
