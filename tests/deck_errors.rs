@@ -69,6 +69,97 @@ compression, swelling, preconsolidation, ocr, elasticity, reference_pressure, sh
     );
 }
 
+/// A hint leads to a key that the deck's model or analysis reads, with its meaning; in doubt there is none.
+#[test]
+fn hints_lead_to_what_is_read() {
+    let unknown = |text: &str, set: &str| {
+        let said = message(text, &[set]);
+        // Beside the list of all keys.
+        let hint = said.lines().filter(|line| !line.contains("known keys of")).collect::<Vec<_>>();
+        let hint = hint.join("\n");
+        assert!(hint.contains("unknown key"), "{set}: {said}");
+        hint
+    };
+    let material = |model: &str, key: &str| {
+        unknown(BEAM, &format!("material.steel={{ model = \"{model}\", {key} = 1 }}"))
+    };
+    for (model, key, words) in [
+        ("hencky", "mu", "young = mu (3 lambda + 2 mu) / (lambda + mu)"),
+        ("neo-hookean", "lambda", "poisson = lambda / (2 (lambda + mu))"),
+        ("mohr-coulomb", "lambda", "Lamé"),
+        ("cam-clay", "lambda", "here it is called \"compression\""),
+        ("hencky", "G", "young = 2 G (1 + poisson)"),
+        ("mohr-coulomb", "G", "young = 2 G (1 + poisson)"),
+        ("cam-clay", "G", "called \"shear\" here"),
+        ("tresca", "c", "is shear_strength"),
+        ("tresca", "phi", "is shear_strength"),
+        ("tresca", "cu", "here it is called \"shear_strength\""),
+        ("mohr-coulomb", "phi", "here it is called \"friction\""),
+        ("mohr-coulomb", "c", "here it is called \"cohesion\""),
+        ("cam-clay", "kappa", "here it is called \"swelling\""),
+        ("cam-clay", "m", "here it is called \"slope\""),
+        ("von-mises", "fy", "here it is called \"yield_stress\""),
+        ("hencky", "rho", "here it is called \"density\" and belongs to [[body]]"),
+        ("hencky", "gamma", "density of [[body]] times gravity"),
+    ] {
+        let said = material(model, key);
+        assert!(said.contains(words), "{model}, {key}: {said}");
+        assert!(!said.contains("gravity\""), "{model}, {key}: {said}");
+    }
+    let silent = |said: &str| {
+        !["here it is called", "did you mean", "belongs to", "write "]
+            .iter()
+            .any(|w| said.contains(w))
+    };
+    for key in ["p0", "m", "kappa", "su", "fy", "mu"] {
+        let said = material("mohr-coulomb", key);
+        assert!(silent(&said), "{key}: {said}");
+    }
+    for key in ["c", "phi", "su", "fy", "kappa"] {
+        let said = material("hencky", key);
+        assert!(silent(&said), "{key}: {said}");
+    }
+    for key in ["time", "end_time", "courant", "dt"] {
+        let said = unknown(BEAM, &format!("analysis.{key}=1"));
+        assert!(said.contains("no time: steps is"), "{key}: {said}");
+        assert!(!said.contains("cfl") && !said.contains("duration"), "{key}: {said}");
+        let said = unknown(COLLISION, &format!("analysis.{key}=1"));
+        assert!(said.contains("cfl") || said.contains("duration"), "{key}: {said}");
+    }
+    for key in ["velocity", "v"] {
+        let said = unknown(BEAM, &format!("boundary.0.{key}=1"));
+        assert!(said.contains("displacement = { x = \"v*t\" }"), "{key}: {said}");
+    }
+    for (set, words) in [
+        ("rigid=[{ name = \"r\", u = [0, 1] }]", "motion = { displacement = [...] }"),
+        ("rigid=[{ name = \"r\", v = [0, 1] }]", "motion = { velocity = [...] }"),
+        ("contact=[{ between = [\"r\", \"b\"], phi = 30 }]", "friction = tan(phi)"),
+        ("contact=[{ between = [\"r\", \"b\"], mu = 0.3 }]", "here it is called \"friction\""),
+    ] {
+        let said = unknown(BEAM, set);
+        assert!(said.contains(words), "{set}: {said}");
+    }
+    for set in [
+        "contact=[{ between = [\"r\", \"b\"], type = \"penalty\" }]",
+        "boundary.0.type=\"fixed\"",
+        "load.0.type=\"gravity\"",
+    ] {
+        let said = unknown(BEAM, set);
+        assert!(silent(&said) && !said.contains("[analysis]"), "{set}: {said}");
+    }
+}
+
+/// A field that cannot be differentiated is named with its line, before the model is made.
+#[test]
+fn a_manufactured_field_has_derivatives() {
+    for formula in ["1e-3*abs(X)", "if(X > 1, 1e-3, 0)"] {
+        let set = format!("load=[{{ manufactured = [\"{formula}\", \"0\"] }}]");
+        let said = message(BEAM, &[&set]);
+        assert!(said.contains("load.0.manufactured: \""), "{said}");
+        assert!(said.contains("no derivative rule"), "{said}");
+    }
+}
+
 #[test]
 fn wrong_type() {
     assert_eq!(

@@ -65,8 +65,88 @@ const WORDS: [(&str, &[&str]); 25] = [
     ("deformation_gradient", &["f"]),
 ];
 
+const LAME: &str = "Lamé's constants are told by young = mu (3 lambda + 2 mu) / (lambda + mu) and \
+                    poisson = lambda / (2 (lambda + mu))";
+const SHEAR_MODULUS: &str = "a shear modulus G is told by young = 2 G (1 + poisson) and poisson";
+const NO_TIME: &str = "this analysis has no time: steps is the number of its load steps";
+const STEP: &str = "a step is duration over steps, or follows from cfl in explicit runs";
+
+/// What sets the time, or the time step, elsewhere.
+const TIMES: [&str; 12] = [
+    "time",
+    "endtime",
+    "tend",
+    "totaltime",
+    "tmax",
+    "finaltime",
+    "courant",
+    "courantnumber",
+    "dt",
+    "timestep",
+    "deltat",
+    "stepsize",
+];
+
+/// What is known of another program's name in a table.
+pub enum Meant {
+    /// The cure.
+    Told(&'static str),
+    /// Too many meanings: any hint would mislead.
+    Unsaid,
+    /// Nothing beyond the names of [`key`].
+    Otherwise,
+}
+
+/// What a name means in a section where no single key has its meaning. `read`: the keys of the section that are
+/// read there; `timeless`: it is that of an analysis of load steps.
+pub fn meant(section: &str, name: &str, read: &[&str], timeless: bool) -> Meant {
+    let small = plain(name);
+    let reads = |key: &str| read.contains(&key);
+    let told = match (section, small.as_str()) {
+        ("contact", "phi" | "frictionangle" | "internalfriction") => {
+            "friction is a coefficient here: friction = tan(phi)"
+        }
+        ("material", "g" | "shearmodulus" | "gmod") if reads("shear") => {
+            "a shear modulus is called \"shear\" here"
+        }
+        ("material", "g" | "shearmodulus" | "gmod") => SHEAR_MODULUS,
+        ("material", "lambda") if !reads("compression") => LAME,
+        ("material", "mu") if !reads("friction") && !reads("compression") => LAME,
+        // Lamé's constant, or a coefficient of friction.
+        ("material", "mu") => return Meant::Unsaid,
+        ("material", "c" | "coh" | "phi" | "frictionangle")
+            if reads("shear_strength") && !reads("yield_stress") && !reads("friction") =>
+        {
+            "the strength of this model is shear_strength, without an angle of friction"
+        }
+        ("material" | "body", "gamma" | "unitweight") => {
+            "weight is density of [[body]] times gravity of [[load]]"
+        }
+        ("boundary", "velocity" | "vel" | "v") => {
+            "for a velocity v along x write displacement = { x = \"v*t\" }, with its value for v"
+        }
+        ("rigid", "u" | "disp" | "displacement") => "write motion = { displacement = [...] }",
+        ("rigid", "v" | "vel") => "write motion = { velocity = [...] }",
+        ("analysis", small) if timeless && TIMES.contains(&small) => NO_TIME,
+        // Neither load steps nor time steps.
+        ("analysis", small) if !reads("duration") && TIMES.contains(&small) => {
+            return Meant::Unsaid;
+        }
+        (_, "dt" | "timestep" | "deltat" | "stepsize") => STEP,
+        ("analysis", "courant" | "courantnumber") if !reads("cfl") => STEP,
+        // Each table has a word of its own for what it is, and most have none.
+        (_, _) if name == "type" && !reads("model") => return Meant::Unsaid,
+        _ => return Meant::Otherwise,
+    };
+    Meant::Told(told)
+}
+
 /// The one of `known` that is meant by another program's name of a key.
 pub fn key<'n>(name: &str, known: impl IntoIterator<Item = &'n str>) -> Option<&'n str> {
+    // G is a shear modulus, and no key of its own.
+    if name == "G" {
+        return None;
+    }
     found(&KEYS, name, known)
 }
 

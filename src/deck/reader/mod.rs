@@ -4,16 +4,17 @@
 //! |---|---|
 //! | `mod.rs` | known keys, missing keys, defaults |
 //! | `values.rs` | numbers, strings, vectors |
+//! | `unknown.rs` | what to say of a key that is not known |
 //! | `words.rs` | words out of a list, expressions |
 //! | `tables.rs` | tables inside tables |
 
 mod tables;
+mod unknown;
 mod values;
 mod words;
 
-use super::problems::{Got, Problems, Reported, nearest};
-use super::schema::{self, Key, Kind, Need, Section, quoted};
-use super::synonyms::{self, plain};
+use super::problems::{Got, Problems, Reported};
+use super::schema::{Key, Kind, Need, Section, quoted};
 use super::tree::{self, Entry, Node, Origin, Value};
 
 /// One table of the deck with its section of the schema.
@@ -52,31 +53,6 @@ impl<'a> Table<'a> {
     /// The table of an absent section: all defaults.
     pub fn absent(problems: &'a Problems, section: &'static Section, path: &'a str) -> Self {
         Table { problems, section, path, origin: &NOWHERE, entries: &[] }
-    }
-
-    fn unknown_key(&self, entry: &Entry) {
-        let known: Vec<&str> = self.section.keys.iter().map(|key| key.name).collect();
-        let mut help = Vec::new();
-        let elsewhere = || {
-            let keys = schema::sections().flat_map(|section| section.keys);
-            synonyms::key(&entry.key, keys.map(|key| key.name))
-        };
-        if let Some(meant) = synonyms::key(&entry.key, known.iter().copied()) {
-            help.push(format!("here it is called \"{meant}\""));
-        } else if let Some(near) = nearest(&entry.key, known.iter().copied()) {
-            help.push(format!("did you mean \"{near}\"?"));
-        } else if let Some(other) = schema::sections().find(|s| s.key(&entry.key).is_some()) {
-            help.push(format!("\"{}\" belongs to {}", entry.key, other.header));
-        } else if matches!(plain(&entry.key).as_str(), "dt" | "timestep" | "deltat" | "stepsize") {
-            help.push("a step is duration over steps, or follows from cfl".to_string());
-        } else if let Some(meant) = elsewhere() {
-            let of = schema::sections().find(|section| section.key(meant).is_some());
-            let of = of.map_or("", |section| section.header);
-            help.push(format!("here it is called \"{meant}\" and belongs to {of}"));
-        }
-        help.push(format!("known keys of {}: {}", self.section.header, known.join(", ")));
-        let message = format!("unknown key \"{}\"", entry.key);
-        self.problems.report(&entry.origin, &self.full(&entry.key), message, help.join("\n"));
     }
 
     /// Dotted path of a key of this table.
