@@ -2,6 +2,11 @@
 //! boundary face is a face of a boundary cell whose two cells are both populated
 //! (Ghost §3.1, §4.2). Found for each body alone, then united.
 //!
+//! A cell of a lattice at the edge of the grid is a boundary cell, too, if the body reaches into it and
+//! no point has its centre there. The paper's bodies fill the cells at the edge; one that comes to
+//! overlap them by 1e-6 of a cell would leave nodes on the edge with as little stiffness, and no
+//! unpopulated cell beside them.
+//!
 //! The penalty bounds the condition only if a path of such faces leads from every cell to a well
 //! filled one (E. Burman, "Ghost penalty", Comptes Rendus Mathematique 348 (2010) 1217-1220).
 //! Points leave triangles and tetrahedra empty between populated ones far more often than the paper's
@@ -23,13 +28,15 @@ use super::ties::ties;
 /// Finds the boundary faces and ties whose lower cell this rank owns, in ascending order.
 ///
 /// `populated` lists the populated cells this rank owns, each with the bits of its bodies, in
-/// ascending order. Cells across a partition border are exchanged twice: once to know which
+/// ascending order. `held`: the bodies, one bit each, that have the centre of a point in a cell of this
+/// rank at the edge of a lattice. Cells across a partition border are exchanged twice: once to know which
 /// neighbours are populated, once to know which of them are boundary cells or bridges.
 pub fn boundary_faces<const D: usize>(
     world: &World,
     grid: &Grid<D>,
     partition: &Partition<D>,
     populated: &[(usize, u64)],
+    held: impl Fn(usize) -> u64,
 ) -> Result<Vec<BoundaryFace>> {
     let mut cells = KnownCells::new(populated);
     let mut owned: Vec<usize> = populated.iter().map(|&(cell, _)| cell).collect();
@@ -43,6 +50,9 @@ pub fn boundary_faces<const D: usize>(
             .iter()
             .fold(u64::MAX, |all, &n| all & cells.get(n).map_or(0, |cell| cell.populated));
         cells.own[at].boundary = bodies & !everywhere;
+        if neighbours.len() < 2 * D {
+            cells.own[at].boundary |= bodies & !held(cell);
+        }
     }
     if grid.element().is_simplex() {
         for (cell, bodies) in bridges(world, grid, partition, &cells) {

@@ -6,6 +6,7 @@
 //! | `model.rs` | the deck made computable: what stays while points move |
 //! | `step_system.rs` | locate, map and number: the grid side of a step |
 //! | `populated.rs` | which cells hold material, and whose |
+//! | `rim.rs` | whose points lie in the cells at a lattice's edge |
 //! | `numbering.rs` | equations over active nodes, contiguous by rank |
 //! | `node_index.rs` | grid nodes to small indices |
 //! | `graph.rs` | which nodes meet |
@@ -44,6 +45,7 @@ pub mod numbering;
 pub mod pattern;
 pub mod plain;
 pub(crate) mod populated;
+pub(crate) mod rim;
 pub mod scatter;
 pub mod shared_nodes;
 pub mod step_system;

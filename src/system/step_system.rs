@@ -9,6 +9,7 @@ use super::numbering::Numbering;
 use super::numbering::Touched;
 use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
+use super::rim::Rim;
 use super::terms::stress::StepPoints;
 use super::terms::surface;
 use super::unknowns::Unknowns;
@@ -139,7 +140,11 @@ impl<const D: usize> Discretisation<D> {
         let populated = Populated::find(world, grid, partition, kinds, points, Some(&influences))?;
         let (faces, ghost_cells) = match coupling {
             Coupling::Matrix | Coupling::Mass => {
-                let (faces, cells) = find_faces(world, model, &populated, fields)?;
+                let rim = match basis.of_one_cell() || model.deck.ghost.is_none() {
+                    true => Rim::default(),
+                    false => Rim::of(grid, points),
+                };
+                let (faces, cells) = find_faces(world, model, (&populated, &rim), fields)?;
                 require_first_jumps(world, basis, &faces)?;
                 (faces, cells)
             }
@@ -384,16 +389,16 @@ fn append_nodes_of_fields<const D: usize>(
 pub(crate) fn find_faces<const D: usize>(
     world: &World,
     model: &Model<D>,
-    populated: &Populated,
+    (populated, rim): (&Populated, &Rim),
     fields: &Fields,
 ) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
     if fields.is_single() {
-        return faces_of_bodies(world, model, populated);
+        return faces_of_bodies(world, model, populated, rim);
     }
     let (mut faces, mut cells) = (Vec::new(), Vec::new());
     for field in 0..fields.count() {
         let own = populated.of_field(fields, field);
-        let (mut found, beside) = faces_of_bodies(world, model, &own)?;
+        let (mut found, beside) = faces_of_bodies(world, model, &own, rim)?;
         let nodes = found.iter_mut().flat_map(|face| &mut face.nodes);
         nodes.for_each(|node| *node = fields.at(field, *node));
         faces.append(&mut found);
@@ -407,13 +412,15 @@ fn faces_of_bodies<const D: usize>(
     world: &World,
     model: &Model<D>,
     populated: &Populated,
+    rim: &Rim,
 ) -> Result<(Vec<FaceStencil>, Vec<usize>)> {
     let Some(ghost) = &model.deck.ghost else { return Ok((Vec::new(), Vec::new())) };
     let kind = (ghost.scaling, model.deck.analysis.symmetry);
     let groups = std::iter::once(&populated.owned).chain(&populated.further);
     let mut found: Vec<(FacePair, FaceStencil)> = Vec::new();
-    for (cells, penalties) in groups.zip(model.penalties.chunks(GROUP)) {
-        let faces = boundary_faces(world, &model.grid, &model.partition, cells)?;
+    for (group, (cells, penalties)) in groups.zip(model.penalties.chunks(GROUP)).enumerate() {
+        let held = |cell| rim.held(group, cell);
+        let faces = boundary_faces(world, &model.grid, &model.partition, cells, held)?;
         let stencils = face_stencils(&model.grid, &faces, kind, penalties);
         let stencils = world.fail_together(stencils)?;
         found.extend(faces.iter().map(|face| face.pair).zip(stencils));

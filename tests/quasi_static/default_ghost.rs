@@ -65,3 +65,59 @@ fn the_default_costs_less_than_a_per_cent_wherever_the_body_lies() {
         assert!(stiff / on_lines < 0.88, "shift {shift}: {stiff}");
     }
 }
+
+/// A cube under its own weight that lies on lines of the grid, one cell from the grid's edges, on a
+/// base that is held.
+fn cube(origin: [f64; 3], size: [f64; 3]) -> Run {
+    Run::text(&format!(
+        r#"
+[analysis]
+type = "quasi-static"
+steps = 3
+tolerance = 1e-10
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+origin = {origin:?}
+size = {size:?}
+h = 0.5
+[material.m]
+model = "hencky"
+young = 1e6
+poisson = 0.2
+[[body]]
+name = "cube"
+material = "m"
+density = 1e4
+shape = {{ box = {{ min = [0, 0, 0], max = [1, 1, 1] }} }}
+[[boundary]]
+name = "base"
+where = {{ box = {{ min = [-0.5, -0.5, 0], max = [1.5, 1.5, 0] }} }}
+fix = ["x", "y", "z"]
+[[load]]
+gravity = [0, 0, -1]
+"#
+    ))
+}
+
+/// From the second step on its domains reach by little into 40 cells around it. Nobody reaches the
+/// cells beyond them, whether there are any or not: a wider grid has to give equal energies. Without
+/// faces at the cells on the grid's edge the second step has no solution to be found.
+#[test]
+fn cells_at_the_edge_of_the_grid_are_held_like_others() {
+    let energies = |run: Run| -> Vec<[f64; 2]> {
+        let results = run.results();
+        let strain = results.history("energy_strain");
+        strain.into_iter().zip(results.history("energy_ghost")).map(|(s, g)| [s, g]).collect()
+    };
+    let wide = energies(cube([-1.0; 3], [3.0; 3]));
+    assert_eq!(wide.len(), 3);
+    for ranks in [1, 3] {
+        let close = energies(cube([-0.5; 3], [2.0; 3]).ranks(ranks));
+        assert_eq!(close.len(), 3, "{ranks} ranks");
+        for (close, wide) in close.iter().flatten().zip(wide.iter().flatten()) {
+            assert!((close / wide - 1.0).abs() < 1e-9, "{ranks} ranks: {close} for {wide}");
+        }
+    }
+}

@@ -21,6 +21,7 @@ use crate::system::facing;
 use crate::system::numbering::Numbering;
 use crate::system::numbering::Touched;
 use crate::system::populated::Populated;
+use crate::system::rim::Rim;
 use crate::system::supports::Support;
 use crate::system::terms::contact::TOUCH;
 use crate::system::terms::surface;
@@ -390,7 +391,9 @@ fn ties<const D: usize>(
     if !model.grid.element().is_simplex() {
         return Ok(Vec::new());
     }
-    step_system::find_faces(world, model, populated, &Fields::default()).map(|(faces, _)| faces)
+    let rim = Rim::default();
+    step_system::find_faces(world, model, (populated, &rim), &Fields::default())
+        .map(|(faces, _)| faces)
 }
 
 /// The sums over all ranks of the pieces whose first node is owned here, ascending.
