@@ -85,7 +85,9 @@ pub const SECTIONS: &[Section] = &[
                 .range(POSITIVE)
                 .read_by(&[IMPLICIT]),
             key("max_iterations", Count, Default("20"),
-                "Evaluations of the residual in one step, the first at zero displacement included.")
+                "Evaluations of the residual in one step, the first at zero displacement included. \
+                 With contact, a step whose iterates come no closer over nine of them is \
+                 solved again with narrower line searches, which takes 12 or more.")
                 .range(at_least(2.0))
                 .read_by(&[IMPLICIT]),
             key("on_failure", Choice(OnFailure::NAMES), Default("\"stop\""),
