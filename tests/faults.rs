@@ -291,6 +291,11 @@ fn formulas_without_a_value_at_the_start() {
     }
     // The key is told once.
     assert!(!outcome.stderr.contains("load.manufactured"), "{}", outcome.stderr);
+    // A run that ends before the formula has no value; its first step follows the stability limit.
+    let short = replaced("gravity = [0, -20]", "gravity = [0, \"-20*sqrt(0.5 - t)\"]")
+        .set("analysis={ type = \"explicit\", cfl = 0.5, duration = 1e-3 }");
+    let outcome = short.word("--check").attempt();
+    assert_eq!(outcome.code, 0, "{}", outcome.stderr);
     let explicit = block().set("analysis={ type = \"explicit\", steps = 10, duration = 1e-3 }");
     refused(
         &explicit.set("body.0.velocity=[0, \"ln(0.5 - X)\"]"),

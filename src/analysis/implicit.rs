@@ -2,7 +2,6 @@
 //! Ghost §2.4), and with inertia ([`super::inertial`]) implicit dynamics. A step:
 //! locate, map, number, {assemble, solve}*, update.
 
-use crate::deck::Deck;
 use crate::deck::model::AnalysisType;
 use crate::error::Result;
 use crate::output::restart::run_state::RunState;
@@ -339,13 +338,6 @@ fn supports_in_step<const D: usize>(
         }
         _ => end,
     }
-}
-
-/// The first load step of the deck.
-pub fn first_span(deck: &Deck) -> StepSpan {
-    let steps = deck.stages.first().and_then(|stage| stage.steps);
-    let factor_end = 1.0 / steps.unwrap_or(1) as f64;
-    StepSpan { stage: 0, factor_start: 0.0, factor_end, time_start: 0.0, time_end: factor_end }
 }
 
 /// Sums of a quasi-static run so far.

@@ -7,11 +7,11 @@ use crate::deck::{Deck, rough};
 use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
+use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::{Coupling, Discretisation};
 
 use super::external::Loads;
-use super::implicit::first_span;
 use super::release::{released, releases};
 
 /// Up to this share of the forces out of balance nothing is said; either is a sum of sizes over the nodes. A unit
@@ -30,7 +30,7 @@ pub(crate) fn warning<const D: usize>(
     if !judged(deck) || releases(model, 0) {
         return Ok(None);
     }
-    let span = first_span(deck);
+    let span = StepSpan::first_of(&deck.stages, 0);
     let (mesh, conditions) =
         Discretisation::with_conditions(world, model, points, Coupling::Matrix, span)?;
     let loads = Loads::of_step(world, model, points, &mesh, span)?;

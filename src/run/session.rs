@@ -28,7 +28,7 @@ use super::start_checks::formulas;
 use super::start_checks::support;
 use super::{aside, element_run, plan, process, setup};
 use crate::analysis::explicit::Explicit;
-use crate::analysis::implicit::{self, Implicit};
+use crate::analysis::implicit::Implicit;
 use crate::analysis::initial_balance;
 use crate::analysis::strength_reduction::StrengthReduction;
 use crate::analysis::{conditioning, solver, time_loop};
@@ -40,6 +40,7 @@ use crate::record::probes;
 use crate::record::recorder::{Closing, Ending, Opening, Recorder, Resume, restore_balance};
 use crate::record::verify;
 use crate::system::apart::require_apart;
+use crate::system::conditions::StepSpan;
 use crate::system::step_system;
 use crate::transfer::update;
 
@@ -224,7 +225,7 @@ impl Start<'_> {
             }
             Some(_) => Vec::new(),
         };
-        let first = implicit::first_span(&model.deck);
+        let first = StepSpan::first_of(&model.deck.stages, 0);
         match model.deck.analysis.kind {
             kind if kind.is_static() && resume.is_none() => {
                 support::require(world, &model, &points, &active, first)?;

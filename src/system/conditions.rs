@@ -3,6 +3,7 @@
 use crate::basis;
 use crate::deck::expression::Expression;
 use crate::deck::model::{Basis, Boundary, Place, Rotation};
+use crate::deck::stage::{Stage, begin_of};
 use crate::deck::{Presence, Scope, When};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -28,6 +29,20 @@ pub struct StepSpan {
 }
 
 impl StepSpan {
+    /// The first step of a stage. Of steps that follow the stability limit only the begin is known.
+    pub fn first_of(stages: &[Stage], stage: usize) -> Self {
+        let known = stages.get(stage).map(|stage| (stage.steps, stage.duration));
+        let (steps, duration) = known.unwrap_or_default();
+        let factor_end = match (steps, duration) {
+            (Some(steps), _) => 1.0 / steps as f64,
+            (None, Some(_)) => 0.0,
+            (None, None) => 1.0,
+        };
+        let time_start = begin_of(stages, stage);
+        let time_end = time_start + factor_end * duration.unwrap_or(1.0);
+        StepSpan { stage, factor_start: 0.0, factor_end, time_start, time_end }
+    }
+
     /// The moment at which it begins.
     pub fn start(&self) -> When {
         When { stage: self.stage, factor: self.factor_start, time: self.time_start }

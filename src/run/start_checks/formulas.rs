@@ -3,7 +3,6 @@
 
 use crate::deck::model::{AnalysisType, Boundary, Deck, Place, Symmetry};
 use crate::deck::schema::AXES;
-use crate::deck::stage::begin_of;
 use crate::deck::{Presence, When, figure};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -13,7 +12,6 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::numbering::Numbering;
 
-use crate::analysis::implicit;
 use crate::system::model::Model;
 use crate::system::unknowns::Unknowns;
 
@@ -29,35 +27,12 @@ pub fn check<const D: usize>(
     points: &Points<D>,
     numbering: &Numbering,
 ) -> Result<Vec<String>> {
-    let span = first_span(&model.deck);
+    let span = StepSpan::first_of(&model.deck.stages, 0);
     velocities(world, &model.deck, points)?;
     if model.deck.analysis.kind != AnalysisType::Conditioning {
         loads::check(world, model, points, span)?;
     }
     boundaries(world, model, points, numbering, span)
-}
-
-/// The first step; with a step that follows the stability limit only its begin is known.
-fn first_span(deck: &Deck) -> StepSpan {
-    let span = implicit::first_span(deck);
-    let first = deck.stages.first();
-    match first.map(|stage| (stage.steps, stage.duration)) {
-        Some((Some(_), Some(duration))) => {
-            StepSpan { time_end: span.factor_end * duration, ..span }
-        }
-        Some((None, _)) => StepSpan { factor_end: 0.0, ..span },
-        _ => span,
-    }
-}
-
-/// The first step of a later stage; with a step that follows the stability limit only its begin.
-fn first_of_stage(deck: &Deck, stage: usize) -> StepSpan {
-    let begin = begin_of(&deck.stages, stage);
-    let known = deck.stages.get(stage);
-    let factor_end = known.and_then(|stage| stage.steps).map_or(0.0, |steps| 1.0 / steps as f64);
-    let duration = known.and_then(|stage| stage.duration).unwrap_or(1.0);
-    let time_end = begin + factor_end * duration;
-    StepSpan { stage, factor_start: 0.0, factor_end, time_start: begin, time_end }
 }
 
 fn velocities<const D: usize>(world: &World, deck: &Deck, points: &Points<D>) -> Result<()> {
@@ -97,7 +72,7 @@ fn boundaries<const D: usize>(
         if let Some(from) = boundary.presence.from.filter(|from| *from > 0)
             && boundary.support().is_some()
         {
-            prescribed(model, index, first_of_stage(deck, from))?;
+            prescribed(model, index, StepSpan::first_of(&deck.stages, from))?;
         }
         if !at_start(boundary) {
             continue;
