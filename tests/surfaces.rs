@@ -805,47 +805,14 @@ fn what_contacts_and_loads_cannot_act_on_is_refused() {
     );
 }
 
-/// A bar that is propped in its second stage.
-const PROPPED_BAR: &str = r#"
-[analysis]
-type = "quasi-static"
-[[stage]]
-name = "loaded"
-steps = 2
-[[stage]]
-name = "propped"
-steps = 4
-[[stage]]
-name = "free"
-steps = 1
-[method]
-basis = "gimp"
-[grid]
-type = "lattice"
-origin = [-0.5, -0.5]
-size = [2.0, 2.0]
-h = 0.25
-[material.m]
-model = "hencky"
-young = 1e6
-poisson = 0.2
-[[body]]
-name = "bar"
-material = "m"
-shape = { box = { min = [0.1, 0.07], max = [1.1, 1.07] } }
-[[boundary]]
-name = "foot"
-surface = { side = "bottom" }
-[[boundary]]
-name = "prop"
-surface = { side = "top" }
-displacement = { y = "-1e-4*s" }
-from = "propped"
-until = "free"
-[[load]]
-traction = { side = "top", value = [0.0, -100.0] }
-until = "propped"
-"#;
+/// [`PROPPED`] with a third stage, in which the prop has gone, and a displacement of the prop.
+fn propped_until_free(displacement: &str) -> String {
+    let stage = "[[stage]]\nname = \"free\"\nsteps = 1\n[method]";
+    let moved = format!(
+        "displacement = {{ y = \"{displacement}\" }}\nfrom = \"propped\"\nuntil = \"free\""
+    );
+    PROPPED.replace("[method]", stage).replace("from = \"propped\"", &moved)
+}
 
 /// The deck with all defaults says from when and until when a surface is held, and reads back to the deck.
 #[test]
@@ -855,7 +822,7 @@ fn the_resolved_deck_tells_when_a_surface_is_held() {
         mpm_par::deck::read(std::path::Path::new("deck.toml"), text, &sets)
             .unwrap_or_else(|error| panic!("{error}\n{text}"))
     };
-    let deck = read(PROPPED_BAR);
+    let deck = read(&propped_until_free("-1e-4*s"));
     assert_eq!(read(&mpm_par::deck::resolved(&deck)), deck);
 }
 
@@ -863,7 +830,7 @@ fn the_resolved_deck_tells_when_a_surface_is_held() {
 #[test]
 fn a_later_support_without_a_value_is_named_at_the_start() {
     let refused = |formula: &str, words: &[&str]| {
-        let outcome = Run::text(&PROPPED_BAR.replace("-1e-4*s", formula)).word("--check").attempt();
+        let outcome = Run::text(&propped_until_free(formula)).word("--check").attempt();
         let said = outcome.said();
         assert_eq!(outcome.code, 2, "{formula}: {said}");
         assert!(words.iter().all(|word| said.contains(word)), "{formula}: {said}");
@@ -874,8 +841,7 @@ fn a_later_support_without_a_value_is_named_at_the_start() {
     refused("if(s > 0.2, sqrt(-s), s)", &[key, "s = 0.25 of stage \"propped\""]);
     refused("1e-4*s*sqrt(1.1-t)", &[key, "s = 0.25 of stage \"propped\""]);
     // What has no value before its stage has one in it.
-    let good = PROPPED_BAR.replace("-1e-4*s", "-1e-4*s*sqrt(t-0.5)");
-    let outcome = Run::text(&good).word("--check").attempt();
+    let outcome = Run::text(&propped_until_free("-1e-4*s*sqrt(t-0.5)")).word("--check").attempt();
     assert_eq!(outcome.code, 0, "{}", outcome.said());
 }
 

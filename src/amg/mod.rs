@@ -187,16 +187,18 @@ pub fn build_unsymmetric<const K: usize, const C: usize>(
     ties: &Ties<K>,
 ) -> Result<Option<Hierarchy>> {
     let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
-    let mut exact = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
+    let mut exact = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts.clone(), count);
     fill(rows, &mut exact);
     let symmetric = surrogate_of(world, nodes, rows, ties)?;
     // Where penalties tie nodes, A has no definite symmetric part before it is corrected.
-    let mut rounded = product(nodes, &symmetric);
-    if !ties.are_there(world) {
-        let ghosts = nodes.global[nodes.owned..].to_vec();
-        rounded = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
-        fill(rows, &mut rounded);
-    }
+    let rounded = match ties.are_there(world) {
+        true => product(nodes, &symmetric),
+        false => {
+            let mut rounded = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
+            fill(rows, &mut rounded);
+            rounded
+        }
+    };
     levels::<K, C>(world, (nodes, &symmetric, &ties.nodes), exact, rounded)
 }
 

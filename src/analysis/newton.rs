@@ -3,7 +3,6 @@
 
 use std::time::Instant;
 
-use crate::basis::Domain;
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::parallel::{World, traffic};
@@ -75,8 +74,7 @@ impl<'a, const D: usize, const N: usize> System<'a, D, N> {
         let matrix = solver::matrix(world, grid, of, unknowns, symmetric)?;
         let stabilised = model.stabilised();
         // A cell may have more nodes than corners of domains: some motions of the nodes then move no corner.
-        let by_corners =
-            matches!(model.deck.method.basis.domain(), Domain::Parallelepiped | Domain::Corners);
+        let by_corners = model.deck.method.basis.domain().has_corners();
         let size = Size {
             shape: solver::Shape::of(model, unknowns, symmetric),
             equations: mesh.numbering.total * N,

@@ -16,6 +16,13 @@ pub enum Domain {
     Corners,
 }
 
+impl Domain {
+    /// Whether corners that move with the material say where it lies.
+    pub fn has_corners(self) -> bool {
+        matches!(self, Domain::Parallelepiped | Domain::Corners)
+    }
+}
+
 /// A value of `method.basis`.
 pub trait Declaration: Sized {
     /// The deck's word.

@@ -32,7 +32,6 @@ use gather::{Gather, Moves};
 use nalgebra::Matrix3;
 pub use named::Named;
 
-use crate::basis::Domain;
 use crate::deck::model::{Basis, Method, Water};
 use crate::grid::lattice::CORNER_SIGNS;
 use crate::tensor::Spectrum;
@@ -257,8 +256,7 @@ point_fields! {
 impl<const D: usize> Points<D> {
     /// No points yet, of a basis that may read no corners: a quarter of a point's memory.
     pub fn of_basis(basis: Basis) -> Self {
-        let cornerless = matches!(basis.domain(), Domain::None | Domain::Box);
-        Points { cornerless, ..Points::default() }
+        Points { cornerless: !basis.domain().has_corners(), ..Points::default() }
     }
 
     /// No points yet, that carry what `method` reads.

@@ -67,7 +67,7 @@ pub fn of<const D: usize>(
 /// its preconditioner), bytes. The counts may be estimates, too.
 pub(crate) fn memory<const D: usize>(basis: Basis, points: f64, nodes: f64) -> f64 {
     let (nodes_each, row) = basis.nodes(D);
-    let corners = if matches!(basis.domain(), Domain::None | Domain::Box) { 8 * D } else { 0 };
+    let corners = if basis.domain().has_corners() { 0 } else { 8 * D };
     // What affine transfers and stages carry is left out: few runs have it.
     let affine = D * D + D + D;
     let per_point = 8 * (Points::<D>::base_words() - corners - affine) + nodes_each * (16 + 8 * D);

@@ -255,7 +255,7 @@ pub fn check_basis(table: &Table<'_>, grid: &Grid, method: &Method) -> Got<()> {
             },
         ));
     }
-    let corners = matches!(method.basis.domain(), Domain::Parallelepiped | Domain::Corners);
+    let corners = method.basis.domain().has_corners();
     if matches!(grid, Grid::Mesh(_)) && corners && method.locking == Locking::FBar {
         return Err(table.problem_with_help(
             "type",
