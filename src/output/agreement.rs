@@ -1,9 +1,9 @@
 //! One rank acts, all ranks get its outcome.
 //!
 //! File work fails on one rank while the others would wait in the next collective call. Every
-//! such step therefore ends in one of these two functions.
+//! such step therefore ends in one of the first two functions.
 
-use mpi::collective::CommunicatorCollectives;
+use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::{Communicator, SimpleCommunicator};
 use mpi::traits::Root;
 
@@ -19,8 +19,20 @@ pub fn on_root(comm: &SimpleCommunicator, act: impl FnOnce() -> Result<()>) -> R
 pub fn all_agree(comm: &SimpleCommunicator, outcome: Result<()>) -> Result<()> {
     let mine = if outcome.is_err() { comm.rank() } else { i32::MAX };
     let mut lowest = i32::MAX;
-    comm.all_reduce_into(&mine, &mut lowest, mpi::collective::SystemOperation::min());
+    comm.all_reduce_into(&mine, &mut lowest, SystemOperation::min());
     if lowest == i32::MAX { Ok(()) } else { share(comm, lowest, outcome) }
+}
+
+/// This rank's first row, and the number of rows of all ranks, where each has `rows`. Collective.
+pub fn place(comm: &SimpleCommunicator, rows: usize) -> (usize, usize) {
+    let (mut before, mut total) = (0_u64, 0_u64);
+    comm.exclusive_scan_into(&(rows as u64), &mut before, SystemOperation::sum());
+    // MPI leaves the result of rank 0 undefined.
+    if comm.rank() == 0 {
+        before = 0;
+    }
+    comm.all_reduce_into(&(rows as u64), &mut total, SystemOperation::sum());
+    (before as usize, total as usize)
 }
 
 fn share(comm: &SimpleCommunicator, from: i32, outcome: Result<()>) -> Result<()> {

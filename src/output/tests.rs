@@ -10,7 +10,8 @@ use super::agreement::{all_agree, on_root};
 use super::directory::{Inputs, ResultsDirectory};
 use super::extent;
 use super::extent::body_summaries;
-use super::series::grid_file::{GridFrame, GridSeries};
+use super::series::frame_series::Series;
+use super::series::grid_file::GridFrame;
 use super::series::hdf5_reader::FileReader;
 use super::series::hdf5_writer::FileWriter;
 use super::series::point_field::PointField;
@@ -111,8 +112,9 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
     let directory =
         ResultsDirectory::create(&folder.join("out"), false, &Inputs::default(), comm).unwrap();
     let points = share_of_points::<D>(comm);
-    let mut series = PointsSeries::create(&directory, PointField::ALL, &[Format::Xdmf], basis, D);
-    let mut grid = GridSeries::create(&directory, &[Format::Xdmf]);
+    let create = || PointsSeries::create(&directory, PointField::ALL, &[Format::Xdmf], (basis, D));
+    let mut series = create();
+    let mut grid = Series::create(&directory, ("grid", "grid"), &[Format::Xdmf]);
     // One cell on each rank with points, with its own nodes.
     let cells = usize::from(!points.is_empty());
     let nodes = cells << D;
@@ -130,22 +132,15 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
         cell_fields: &[("cost", &vec![2.0; cells])],
     };
     for step in STEPS {
-        series.write(step, 0.1 * step as f64, &points, comm).unwrap();
-        grid.write(step, 0.1 * step as f64, &frame, comm).unwrap();
+        let when = (step, 0.1 * step as f64);
+        series.write(when, &points, comm).unwrap();
+        grid.write(when, &frame.shown(comm.rank()), comm).unwrap();
     }
     // A restart after step 0 forgets step 5 and writes it again.
-    let mut series = PointsSeries::resume(
-        &directory,
-        PointField::ALL,
-        &[Format::Xdmf],
-        (basis, D),
-        0,
-        &mut Log::silent(),
-        comm,
-    )
-    .unwrap();
+    let mut series = create();
+    series.resume(0, &mut Log::silent(), comm).unwrap();
     series.cut(comm).unwrap();
-    series.write(5, 0.5, &points, comm).unwrap();
+    series.write((5, 0.5), &points, comm).unwrap();
 
     let bodies = body_summaries(&points, 3, (basis, Symmetry::PlaneStrain), comm);
     assert_eq!(bodies[0].min, std::array::from_fn::<_, D, _>(|axis| [0.5, 0.25, 0.5][axis]));
@@ -259,10 +254,10 @@ fn write_tables(folder: &Path, comm: &SimpleCommunicator) {
         history.push(&row(step), comm).unwrap();
         residuals.push_step(step, &[1.0, 1e-10], comm).unwrap();
     }
-    let mark = Mark { rows: 2, step: 2 };
-    let mut history = History::resume(&directory, layout(), mark, &mut log, comm).unwrap();
-    let mark = Mark { rows: 4, step: 2 };
-    let mut residuals = Residuals::resume(&directory, mark, &mut log, comm).unwrap();
+    let mut history = History::create(&directory, layout()).unwrap();
+    history.table.resume(Mark { rows: 2, step: 2 }, &mut log, comm).unwrap();
+    let mut residuals = Residuals::create(&directory).unwrap();
+    residuals.table.resume(Mark { rows: 4, step: 2 }, &mut log, comm).unwrap();
     history.table.open(comm).unwrap();
     residuals.table.open(comm).unwrap();
     history.push(&row(3), comm).unwrap();

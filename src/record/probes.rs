@@ -99,17 +99,13 @@ impl Probes {
             let columns = columns.into_iter().map(|(_, _, field, k)| (field, k)).collect();
             watches.push(Watch { followed, columns, last: 0 });
         }
-        let path = directory.file(PROBES);
-        let table = match resume {
-            None => CsvTable::create(&path, &header)?,
-            Some(state) => {
-                // The earlier part may have had no probes.
-                let count = |name: &str| state.count(name).map_or(0, |n| n as usize);
-                let mark =
-                    Mark { rows: count("recorder.probe_rows"), step: count("recorder.probe_step") };
-                CsvTable::resume(&path, &header, mark, log, world.comm())?
-            }
-        };
+        let mut table = CsvTable::create(&directory.file(PROBES), &header)?;
+        if let Some(state) = resume {
+            let count = |name: &str| state.count(name).map_or(0, |n| n as usize);
+            let mark =
+                Mark { rows: count("recorder.probe_rows"), step: count("recorder.probe_step") };
+            table.resume(mark, log, world.comm())?;
+        }
         Ok(Some(Probes { watches, table }))
     }
 

@@ -20,6 +20,8 @@
 
 use std::path::{Path, PathBuf};
 
+use bytemuck::NoUninit;
+use hdf5::H5Type;
 use mpi::topology::{Communicator, SimpleCommunicator};
 
 use super::run_state::RunState;
@@ -29,7 +31,7 @@ use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::agreement::{all_agree, on_root};
 use crate::output::series::hdf5_reader::FileReader;
-use crate::output::series::hdf5_writer::{FileWriter, Plain};
+use crate::output::series::hdf5_writer::FileWriter;
 use crate::output::whole_file::sync_names;
 use crate::points::{Named, Points};
 
@@ -409,7 +411,7 @@ fn rows_sum<T: Word>(first: usize, columns: usize, values: &[T]) -> u64 {
 }
 
 /// What a checkpoint is made of.
-trait Word: Plain + Clone + Default {
+trait Word: H5Type + NoUninit + Default {
     fn word(&self) -> u64;
 }
 

@@ -7,8 +7,8 @@
 //! | `cpdi1` | the parallelogram that [`crate::basis::cpdi1::corner_positions`] works with |
 //! | `cpdi2` | the corners that the point carries |
 
+use super::frame::Topology;
 use super::point_field::append_vector;
-use super::xdmf::Topology;
 use crate::basis;
 use crate::basis::Domain;
 use crate::deck::model::{Basis, GimpEdge};

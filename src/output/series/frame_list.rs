@@ -1,133 +1,143 @@
-//! Small files that list the frames of a series and their times.
+//! Small files that list the frames of a series and their times, for the readers that open them.
 //!
 //! | file | lists | for |
 //! |---|---|---|
+//! | `points.xdmf` | `points-*.h5` | ParaView, VisIt |
 //! | `points.pvd` | `points-*.vtu` | ParaView, VisIt |
 //! | `points.vtkhdf.series` | `points-*.h5`, which are VTKHDF files then | ParaView |
 //!
-//! and likewise for `domains` and `grid`.
+//! and likewise for `domains`, `grid` and `rigid`.
 
 use std::fs;
+use std::path::Path;
 
 use mpi::topology::SimpleCommunicator;
 
+use super::frame::{Frame, Totals};
+use super::frame_series::StepTime;
 use super::growing_file::GrowingFile;
+use super::xdmf;
 use crate::deck::model::Format;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::output::agreement::on_root;
 use crate::output::directory::ResultsDirectory;
-use crate::output::names::{PVD_HEAD, SERIES_LIST_HEAD};
+use crate::output::names::{PVD_HEAD, SERIES_HEAD, SERIES_LIST_HEAD, names_in, number_of};
+use crate::output::terminal::log::Log;
 use crate::output::whole_file::cannot_read;
-
-/// Which list.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    Pvd,
-    Series,
-}
-
-impl Kind {
-    /// The lists that a deck's formats ask for.
-    pub fn of(formats: &[Format]) -> impl Iterator<Item = Kind> + use<'_> {
-        formats.iter().filter_map(|format| match format {
-            Format::Xdmf => None,
-            Format::VtkHdf => Some(Kind::Series),
-            Format::Vtu => Some(Kind::Pvd),
-        })
-    }
-
-    fn name(self, frames: &str) -> String {
-        match self {
-            Kind::Pvd => format!("{frames}.pvd"),
-            Kind::Series => format!("{frames}.vtkhdf.series"),
-        }
-    }
-
-    fn ends(self) -> (&'static str, &'static str) {
-        match self {
-            Kind::Pvd => (PVD_HEAD, "</Collection>\n</VTKFile>\n"),
-            Kind::Series => (SERIES_LIST_HEAD, "]}\n"),
-        }
-    }
-
-    /// A line of its own.
-    fn piece(self, frames: &str, step: usize, time: f64, first: bool) -> String {
-        match self {
-            Kind::Pvd => format!(
-                "<DataSet timestep=\"{time:e}\" part=\"0\" file=\"{frames}-{step:06}.vtu\"/>\n"
-            ),
-            Kind::Series => {
-                let comma = if first { "" } else { "," };
-                format!("{comma}{{\"name\":\"{frames}-{step:06}.h5\",\"time\":{time:e}}}\n")
-            }
-        }
-    }
-}
 
 /// A list that grows by a frame at a time and is whole at any moment.
 #[derive(Debug)]
 pub struct FrameList {
-    kind: Kind,
-    /// `points`, `domains` or `grid`.
-    frames: &'static str,
+    pub format: Format,
+    /// `points`, `domains`, `grid` or `rigid`.
+    name: &'static str,
+    /// Beginning of the names of the HDF5 files that hold the data.
+    data: &'static str,
     file: GrowingFile,
-    /// Step and line of each frame; on rank 0 only.
+    /// Step and text of each frame; on rank 0 only.
     pieces: Vec<(usize, String)>,
     /// The file holds later ones.
     longer: bool,
 }
 
 impl FrameList {
-    pub fn new(directory: &ResultsDirectory, frames: &'static str, kind: Kind) -> Self {
-        let (head, tail) = kind.ends();
-        let file = GrowingFile::new(&directory.file(&kind.name(frames)), head, tail);
-        FrameList { kind, frames, file, pieces: Vec::new(), longer: false }
+    pub fn new(
+        directory: &ResultsDirectory,
+        (name, data): (&'static str, &'static str),
+        format: Format,
+    ) -> Self {
+        let ending = match format {
+            Format::Xdmf => "xdmf",
+            Format::Vtu => "pvd",
+            Format::VtkHdf => "vtkhdf.series",
+        };
+        let (head, tail) = ends(format);
+        let file = GrowingFile::new(&directory.file(&format!("{name}.{ending}")), head, tail);
+        FrameList { format, name, data, file, pieces: Vec::new(), longer: false }
     }
 
-    /// Continues the list of an earlier run, up to and including `last_step`; one that is not there
-    /// begins anew. Nothing is written before [`Self::cut`].
+    /// Continues the list of an earlier run, up to and including `last_step`; one that is not there begins
+    /// anew, which is said where frames were written before. Nothing is written before [`Self::cut`].
     pub fn resume(
-        directory: &ResultsDirectory,
-        frames: &'static str,
-        kind: Kind,
+        &mut self,
         last_step: usize,
+        log: &mut Log,
         comm: &SimpleCommunicator,
-    ) -> Result<Self> {
-        let mut list = Self::new(directory, frames, kind);
+    ) -> Result<()> {
         on_root(comm, || {
-            let path = list.file.path();
+            let path = self.file.path();
             if path.exists() {
                 let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
-                let all: Vec<(usize, String)> =
-                    text.lines().filter_map(|line| numbered(frames, line)).collect();
+                let all = match self.format {
+                    Format::Xdmf => xdmf::split(&text).ok_or_else(|| not_ours(path))?,
+                    _ => text.lines().filter_map(|line| numbered(self.name, line)).collect(),
+                };
                 let before = all.len();
-                list.pieces = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
-                list.longer = list.pieces.len() < before;
-                list.file.assume(texts(&list.pieces));
+                self.pieces = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
+                self.longer = self.pieces.len() < before;
+                self.file.assume(texts(&self.pieces));
+            } else if self.format == Format::Xdmf && has_frames(path, self.data, last_step)? {
+                log.say(&format!(
+                    "warning: {} is not there: the series begins anew after step {last_step}, and \
+                     does not show the earlier frames",
+                    path.display()
+                ));
             }
             Ok(())
-        })?;
-        Ok(list)
+        })
     }
 
     /// Takes what comes later out of the file.
     pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
         on_root(comm, || {
-            if self.longer {
+            if std::mem::take(&mut self.longer) {
                 self.file.replace(texts(&self.pieces))?;
-                self.longer = false;
             }
             Ok(())
         })
     }
 
     /// Adds a frame.
-    pub fn push(&mut self, step: usize, time: f64, comm: &SimpleCommunicator) -> Result<()> {
+    pub fn push(
+        &mut self,
+        (step, time): StepTime,
+        frame: &Frame<'_>,
+        totals: Totals,
+        comm: &SimpleCommunicator,
+    ) -> Result<()> {
         on_root(comm, || {
-            self.pieces
-                .push((step, self.kind.piece(self.frames, step, time, self.pieces.is_empty())));
+            let piece = match self.format {
+                Format::Xdmf => {
+                    let data = format!("{}-{step:06}.h5", self.data);
+                    xdmf::piece((step, time), frame, totals, &data)
+                }
+                format => line(format, self.name, (step, time), self.pieces.is_empty()),
+            };
+            self.pieces.push((step, piece));
             self.file.push(texts(&self.pieces))
         })
+    }
+}
+
+/// What stands before and behind the frames.
+fn ends(format: Format) -> (&'static str, &'static str) {
+    match format {
+        Format::Xdmf => (SERIES_HEAD, xdmf::TAIL),
+        Format::Vtu => (PVD_HEAD, "</Collection>\n</VTKFile>\n"),
+        Format::VtkHdf => (SERIES_LIST_HEAD, "]}\n"),
+    }
+}
+
+/// The line of a frame in the lists that have one for each.
+fn line(format: Format, name: &str, (step, time): StepTime, first: bool) -> String {
+    match format {
+        Format::Vtu => {
+            format!("<DataSet timestep=\"{time:e}\" part=\"0\" file=\"{name}-{step:06}.vtu\"/>\n")
+        }
+        _ => {
+            let comma = if first { "" } else { "," };
+            format!("{comma}{{\"name\":\"{name}-{step:06}.h5\",\"time\":{time:e}}}\n")
+        }
     }
 }
 
@@ -136,10 +146,25 @@ fn texts(pieces: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
 }
 
 /// The step that a line names, and the line.
-fn numbered(frames: &str, line: &str) -> Option<(usize, String)> {
-    let rest = line.split(&format!("\"{frames}-")).nth(1)?;
+fn numbered(name: &str, line: &str) -> Option<(usize, String)> {
+    let rest = line.split(&format!("\"{name}-")).nth(1)?;
     let digits: String = rest.chars().take_while(char::is_ascii_digit).collect();
     Some((digits.parse().ok()?, format!("{line}\n")))
+}
+
+/// The folder of a list holds frames up to `last_step`.
+fn has_frames(path: &Path, data: &str, last_step: usize) -> Result<bool> {
+    let names = names_in(path.parent().unwrap_or(Path::new(".")))?;
+    let number = |name: &String| number_of(name, &format!("{data}-"));
+    Ok(names.iter().filter_map(number).any(|step| step <= last_step))
+}
+
+fn not_ours(path: &Path) -> Error {
+    Error::File(format!(
+        "{} is not a time series that this program wrote: restore it, or move it away and the \
+         series starts anew",
+        path.display()
+    ))
 }
 
 #[cfg(test)]
@@ -148,15 +173,15 @@ mod tests {
 
     #[test]
     fn lines_are_found_again() {
-        for kind in [Kind::Pvd, Kind::Series] {
-            let (head, tail) = kind.ends();
+        for format in [Format::Vtu, Format::VtkHdf] {
+            let (head, tail) = ends(format);
+            let steps = [0, 5, 1_000_000];
             let pieces: Vec<String> =
-                [0, 5, 1_000_000].map(|s| kind.piece("points", s, 0.1 * s as f64, s == 0)).to_vec();
+                steps.map(|s| line(format, "points", (s, 0.1 * s as f64), s == 0)).to_vec();
             let text = format!("{head}{}{tail}", pieces.concat());
             let found: Vec<_> = text.lines().filter_map(|line| numbered("points", line)).collect();
-            let expected: Vec<_> = [0, 5, 1_000_000].into_iter().zip(pieces).collect();
-            assert_eq!(found, expected);
-            if kind == Kind::Series {
+            assert_eq!(found, steps.into_iter().zip(pieces).collect::<Vec<_>>());
+            if format == Format::VtkHdf {
                 let list: serde_json::Value = serde_json::from_str(&text).unwrap();
                 assert_eq!(list["files"][1]["name"], "points-000005.h5");
                 assert_eq!(list["files"][1]["time"], 0.5);

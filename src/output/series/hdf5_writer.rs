@@ -15,16 +15,16 @@ use std::mem;
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
+use bytemuck::NoUninit;
 use hdf5::H5Type;
 use hdf5::plist::dataset_create::{AllocTime, FillTime};
 use hdf5::types::TypeDescriptor;
 use hdf5_sys::h5a::H5Awrite;
-use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::{Communicator, SimpleCommunicator};
 use mpi::traits::Root;
 
 use crate::error::{Error, Result};
-use crate::output::agreement::{all_agree, on_root};
+use crate::output::agreement::{all_agree, on_root, place};
 use crate::output::whole_file::{Partial, cannot_write};
 
 /// What network file systems cache as a unit, bytes.
@@ -82,12 +82,17 @@ impl<'c> FileWriter<'c> {
 
     /// Writes a table of `columns` columns (a plain vector for one column): `values` are this
     /// rank's rows, row by row. Returns the number of rows of all ranks.
-    pub fn write_rows<T: Plain>(&self, name: &str, columns: usize, values: &[T]) -> Result<usize> {
+    pub fn write_rows<T: H5Type + NoUninit>(
+        &self,
+        name: &str,
+        columns: usize,
+        values: &[T],
+    ) -> Result<usize> {
         assert!(
             columns > 0 && values.len().is_multiple_of(columns),
             "{name}: rows of unequal length"
         );
-        let (first, total) = self.place(values.len() / columns);
+        let (first, total) = place(self.comm, values.len() / columns);
         let mut start = NOWHERE;
         self.lay_out(|file| {
             start = new_dataset::<T>(file, name, total, columns)?;
@@ -98,7 +103,7 @@ impl<'c> FileWriter<'c> {
             Ok(())
         } else {
             let own = start + (first * columns * size_of::<T>()) as u64;
-            self.rows.write_all_at(T::bytes(values), own)
+            self.rows.write_all_at(bytemuck::cast_slice(values), own)
         };
         all_agree(self.comm, outcome.map_err(|reason| cannot_write(self.path(), &reason)))?;
         Ok(total)
@@ -110,11 +115,6 @@ impl<'c> FileWriter<'c> {
             let attribute = file.new_attr::<T>().create(name)?;
             attribute.as_writer().write_scalar(value)
         })
-    }
-
-    /// Lets rank 0 add groups, links and attributes to the file; every rank gets the outcome.
-    pub fn arrange(&self, act: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> Result<()> {
-        self.lay_out(act)
     }
 
     /// Attaches unit and meaning to a dataset; an empty text is left out.
@@ -132,7 +132,7 @@ impl<'c> FileWriter<'c> {
 
     /// The row of the whole table at which this rank's `rows` rows start.
     pub fn first_row(&self, rows: usize) -> usize {
-        self.place(rows).0
+        place(self.comm, rows).0
     }
 
     /// Brings the file to the disk, closes it and gives it its name.
@@ -159,25 +159,12 @@ impl<'c> FileWriter<'c> {
         self.partial.name()
     }
 
-    /// Rank 0 lets HDF5 act; every rank gets the outcome.
-    fn lay_out(&self, act: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> Result<()> {
+    /// Lets rank 0 add datasets, groups, links and attributes to the file; every rank gets the outcome.
+    pub fn lay_out(&self, act: impl FnOnce(&hdf5::File) -> hdf5::Result<()>) -> Result<()> {
         on_root(self.comm, || match &self.layout {
             Some(file) => act(file).map_err(|reason| refused(self.path(), &reason)),
             None => Ok(()),
         })
-    }
-
-    /// This rank's first row, and the number of rows of all ranks.
-    fn place(&self, rows: usize) -> (usize, usize) {
-        let (mut before, mut total) = (0_u64, 0_u64);
-        let rows = rows as u64;
-        self.comm.exclusive_scan_into(&rows, &mut before, SystemOperation::sum());
-        // MPI leaves the result of rank 0 undefined.
-        if self.comm.rank() == 0 {
-            before = 0;
-        }
-        self.comm.all_reduce_into(&rows, &mut total, SystemOperation::sum());
-        (before as usize, total as usize)
     }
 }
 
@@ -248,21 +235,3 @@ fn refused(path: &Path, reason: &hdf5::Error) -> Error {
         None => Error::File(format!("cannot write {}: {reason}", path.display())),
     }
 }
-
-/// Numbers that are written as they lie in memory.
-pub trait Plain: H5Type + Sized {
-    fn bytes(values: &[Self]) -> &[u8];
-}
-
-macro_rules! plain {
-    ($($kind:ty),*) => {$(
-        impl Plain for $kind {
-            fn bytes(values: &[Self]) -> &[u8] {
-                // SAFETY: numbers have no padding, and any byte is a valid u8; the borrow is kept.
-                unsafe { std::slice::from_raw_parts(values.as_ptr().cast(), size_of_val(values)) }
-            }
-        }
-    )*};
-}
-
-plain!(u8, u64, i64, f64);

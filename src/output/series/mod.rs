@@ -1,18 +1,25 @@
 //! Fields over time, for ParaView and Python: HDF5 data and the XDMF that describes them.
 //!
+//! | file on disk | what it shows |
+//! |---|---|
+//! | `points-*`, `domains-*` | `points_file.rs`, `point_field.rs`, `domains.rs` |
+//! | `grid-*` | `grid_file.rs` |
+//! | `rigid-*` | `rigid_file.rs` |
+//!
+//! Each of them makes a [`frame::Frame`], which a [`frame_series::Series`] writes in the formats of the deck:
+//!
 //! | file on disk | file |
 //! |---|---|
-//! | `points-*.h5`, `points.xdmf` | `points_file.rs`, `point_field.rs` |
-//! | `domains.xdmf` | `domains.rs` |
-//! | `grid-*.h5`, `grid.xdmf` | `grid_file.rs` |
-//! | `*.vtu`, VTKHDF groups, `*.pvd`, `*.vtkhdf.series` | `vtu.rs`, `vtkhdf.rs`, `frame_list.rs` |
-//! | frames read by one process | `frames.rs` |
-//! | `rigid-*.h5`, `rigid.xdmf` | `rigid_file.rs` |
-//! | HDF5 files written, and read, by all ranks | `hdf5_writer.rs`, `hdf5_reader.rs` |
-//! | XDMF time series | `xdmf.rs`, `growing_file.rs` |
+//! | `*.h5`, and its VTKHDF group | `hdf5_writer.rs`, `vtkhdf.rs` |
+//! | `*.vtu` | `vtu.rs` |
+//! | `*.xdmf`, `*.pvd`, `*.vtkhdf.series` | `frame_list.rs`, `xdmf.rs`, `growing_file.rs` |
+//!
+//! `hdf5_reader.rs` reads HDF5 files on all ranks, `frames.rs` the frames of a run by one process.
 
 pub(crate) mod domains;
+pub(crate) mod frame;
 pub(crate) mod frame_list;
+pub(crate) mod frame_series;
 pub(crate) mod frames;
 pub(crate) mod grid_file;
 pub(crate) mod growing_file;

@@ -8,131 +8,77 @@ use std::fs::{File, OpenOptions};
 use std::os::unix::fs::FileExt;
 use std::path::Path;
 
-use mpi::collective::{CommunicatorCollectives, SystemOperation};
 use mpi::topology::{Communicator, SimpleCommunicator};
 
-use super::hdf5_writer::Plain;
-use super::xdmf::Topology;
+use super::frame::{Array, Frame, Number, Values};
 use crate::error::Result;
-use crate::output::agreement::{all_agree, on_root};
+use crate::output::agreement::{all_agree, on_root, place};
 use crate::output::whole_file::{Partial, cannot_write};
 
-/// VTK's number of a kind of cell.
-pub fn cell_type(topology: Topology) -> u8 {
-    match topology {
-        Topology::Polyvertex => 1,
-        Topology::Segment => 3,
-        Topology::Triangle => 5,
-        Topology::Quadrilateral => 9,
-        Topology::Tetrahedron => 10,
-        Topology::Hexahedron => 12,
-    }
+/// An array in the file, which begins `start` bytes behind the first one.
+struct Part<'a> {
+    array: &'a Array<'a>,
+    /// This rank's first row, and the number of all.
+    rows: (usize, usize),
+    start: u64,
 }
 
-/// A table of numbers at points or cells; this rank's rows are made when they are written.
-pub struct Array<'a> {
-    name: &'a str,
-    /// VTK's type, and bytes of a number.
-    kind: (&'static str, usize),
-    columns: usize,
-    /// VTK takes a row as so many numbers in line, and not as one of several columns.
-    in_line: bool,
-    components: &'static [&'static str],
-    rows: Box<dyn Fn() -> Vec<u8> + 'a>,
-}
-
-impl<'a> Array<'a> {
-    pub fn floats(name: &'a str, columns: usize, rows: impl Fn() -> Vec<f64> + 'a) -> Self {
-        let rows = Box::new(move || bytes_of(&rows()));
-        Array { name, kind: ("Float64", 8), columns, in_line: false, components: &[], rows }
+impl Part<'_> {
+    /// VTK's type, and the bytes of a row.
+    fn kind(&self) -> (&'static str, usize) {
+        match self.array.number {
+            Number::Float => ("Float64", 8 * self.array.columns),
+            Number::Integer => ("Int64", 8 * self.array.columns),
+            Number::Byte => ("UInt8", self.array.columns),
+        }
     }
 
-    pub fn integers(name: &'a str, rows: impl Fn() -> Vec<i64> + 'a) -> Self {
-        let rows = Box::new(move || bytes_of(&rows()));
-        Array { name, kind: ("Int64", 8), columns: 1, in_line: false, components: &[], rows }
+    fn bytes(&self) -> u64 {
+        (self.rows.1 * self.kind().1) as u64
     }
 
-    /// Names of the columns.
-    pub fn with_components(self, components: &'static [&'static str]) -> Self {
-        Array { components, ..self }
-    }
-
-    fn row_bytes(&self) -> usize {
-        self.columns * self.kind.1
-    }
-
-    fn xml(&self, offset: u64) -> String {
-        let words = self.components.iter().enumerate();
-        let names: String =
+    fn xml(&self) -> String {
+        let Array { name, columns, components, .. } = self.array;
+        let words = components.iter().enumerate();
+        let words: String =
             words.map(|(k, word)| format!(" ComponentName{k}=\"{word}\"")).collect();
         format!(
-            "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\"{names} \
-             format=\"appended\" offset=\"{offset}\"/>\n",
-            self.kind.0,
-            self.name,
-            if self.in_line { 1 } else { self.columns }
+            "<DataArray type=\"{}\" Name=\"{name}\" NumberOfComponents=\"{columns}\"{words} \
+             format=\"appended\" offset=\"{}\"/>\n",
+            self.kind().0,
+            self.start
         )
     }
 }
 
-/// This rank's share of a frame.
-pub struct Frame<'a> {
-    pub topology: Topology,
-    pub points: usize,
-    pub cells: usize,
-    /// x, y, z of each point.
-    pub places: Box<dyn Fn() -> Vec<f64> + 'a>,
-    /// Points of each cell, numbered over all ranks; `None`: each cell has its own, in order.
-    pub connectivity: Option<&'a [usize]>,
-    pub point_data: Vec<Array<'a>>,
-    pub cell_data: Vec<Array<'a>>,
-}
-
-/// A part of the file, whose rows belong to points or to cells.
-struct Part<'a> {
-    array: Array<'a>,
-    first: usize,
-    total: usize,
-    start: u64,
-}
-
 /// Writes a frame. `time` is in s, or the load factor. Collective.
-pub fn write(path: &Path, time: f64, frame: Frame<'_>, comm: &SimpleCommunicator) -> Result<()> {
-    let Frame { topology, points, cells, places, connectivity, point_data, cell_data } = frame;
-    let (of_points, of_cells) = (place(points, comm), place(cells, comm));
-    let (first, per_cell) = (of_cells.0, topology.nodes_per_element());
-    let numbers = Array::integers("connectivity", move || match connectivity {
-        Some(given) => given.iter().map(|&node| node as i64).collect(),
-        None => (first * per_cell..(first + cells) * per_cell).map(|node| node as i64).collect(),
-    });
-    // One row for each cell, as wide as the cell has points.
-    let numbers = Array { columns: per_cell, in_line: true, ..numbers };
-    let ends = Array::integers("offsets", move || {
-        (first + 1..first + cells + 1).map(|cell| (cell * per_cell) as i64).collect()
-    });
-    let types = Array {
-        kind: ("UInt8", 1),
-        rows: Box::new(move || vec![cell_type(topology); cells]),
-        ..Array::integers("types", Vec::new)
-    };
-    let places = Array::floats("Points", 3, places);
-
-    let groups = [
-        ("PointData", point_data, of_points),
-        ("CellData", cell_data, of_cells),
-        ("Points", vec![places], of_points),
-        ("Cells", vec![numbers, ends, types], of_cells),
+pub fn write(path: &Path, time: f64, frame: &Frame<'_>, comm: &SimpleCommunicator) -> Result<()> {
+    let (of_points, of_cells) = (place(comm, frame.points), place(comm, frame.cells));
+    let (first, cells, per_cell) = (of_cells.0, frame.cells, frame.topology.points_per_cell());
+    let of_nodes = (first * per_cell, of_cells.1 * per_cell);
+    let places = Array::new("Points", Number::Float, || (frame.places.values)());
+    let places = Array { columns: 3, ..places };
+    let numbers = Array::integers("connectivity", || frame.numbers(first));
+    let end_of = |cell| (cell * per_cell) as i64;
+    let ends = Array::integers("offsets", || (first + 1..=first + cells).map(end_of).collect());
+    let types = || Values::Bytes(vec![frame.topology.vtk_number(); cells]);
+    let types = Array::new("types", Number::Byte, types);
+    let groups: [(&str, Vec<(&Array<'_>, _)>); 4] = [
+        ("PointData", frame.own_point_data().map(|array| (array, of_points)).collect()),
+        ("CellData", frame.cell_data.iter().map(|array| (array, of_cells)).collect()),
+        ("Points", vec![(&places, of_points)]),
+        ("Cells", vec![(&numbers, of_nodes), (&ends, of_cells), (&types, of_cells)]),
     ];
     let mut parts = Vec::new();
     let mut xml = String::new();
     let mut end = 0_u64;
-    for (group, arrays, (first, total)) in groups {
+    for (group, arrays) in groups {
         xml.push_str(&format!("<{group}>\n"));
-        for array in arrays {
-            xml.push_str(&array.xml(end));
-            let length = (total * array.row_bytes()) as u64;
-            parts.push(Part { array, first, total, start: end });
-            end += 8 + length;
+        for (array, rows) in arrays {
+            let part = Part { array, rows, start: end };
+            xml.push_str(&part.xml());
+            end += 8 + part.bytes();
+            parts.push(part);
         }
         xml.push_str(&format!("</{group}>\n"));
     }
@@ -146,13 +92,13 @@ pub fn write(path: &Path, time: f64, frame: Frame<'_>, comm: &SimpleCommunicator
     })?;
     let own = || -> std::io::Result<()> {
         let file = OpenOptions::new().write(true).open(partial.path())?;
-        for Part { array, first, total, start } in &parts {
-            let start = head.len() as u64 + start;
+        for part in &parts {
+            let start = head.len() as u64 + part.start;
             if comm.rank() == 0 {
-                let length = (total * array.row_bytes()) as u64;
-                file.write_all_at(&length.to_ne_bytes(), start)?;
+                file.write_all_at(&part.bytes().to_ne_bytes(), start)?;
             }
-            file.write_all_at(&(array.rows)(), start + 8 + (first * array.row_bytes()) as u64)?;
+            let before = (part.rows.0 * part.kind().1) as u64;
+            file.write_all_at((part.array.values)().bytes(), start + 8 + before)?;
         }
         if comm.rank() == 0 {
             let tail = b"\n</AppendedData>\n</VTKFile>\n";
@@ -162,22 +108,6 @@ pub fn write(path: &Path, time: f64, frame: Frame<'_>, comm: &SimpleCommunicator
     };
     all_agree(comm, own().map_err(|reason| failed(&reason)))?;
     on_root(comm, || partial.give_name())
-}
-
-fn bytes_of<T: Plain>(values: &[T]) -> Vec<u8> {
-    T::bytes(values).to_vec()
-}
-
-/// This rank's first row, and the number of all.
-fn place(count: usize, comm: &SimpleCommunicator) -> (usize, usize) {
-    let (mut before, mut total) = (0_u64, 0_u64);
-    comm.exclusive_scan_into(&(count as u64), &mut before, SystemOperation::sum());
-    // MPI leaves the result of rank 0 undefined.
-    if comm.rank() == 0 {
-        before = 0;
-    }
-    comm.all_reduce_into(&(count as u64), &mut total, SystemOperation::sum());
-    (before as usize, total as usize)
 }
 
 /// Everything before the data.

@@ -5,310 +5,127 @@
 //! folder; every stated dimension is the stored one.
 
 use std::fmt::Write as _;
-use std::fs;
-use std::path::Path;
 
-use mpi::topology::SimpleCommunicator;
 use quick_xml::escape::escape;
 
-use crate::error::{Error, Result};
-use crate::output::agreement::on_root;
-use crate::output::names::{SERIES_HEAD, names_in, number_of};
-use crate::output::terminal::log::Log;
-use crate::output::whole_file::cannot_read;
-
-use super::growing_file::GrowingFile;
-
-/// Number type of a dataset.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Number {
-    /// `f64`
-    Float,
-    /// `i64`
-    Int,
-}
-
-/// A dataset in an HDF5 file: rows of `columns` numbers.
-#[derive(Debug, Clone)]
-pub struct DataItem {
-    pub number: Number,
-    pub rows: usize,
-    pub columns: usize,
-    /// `points-000005.h5`, without folder
-    pub file: String,
-    pub dataset: String,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Topology {
-    Polyvertex,
-    Segment,
-    Triangle,
-    Quadrilateral,
-    Tetrahedron,
-    Hexahedron,
-}
-
-impl Topology {
-    fn name(self) -> &'static str {
-        match self {
-            Topology::Polyvertex => "Polyvertex",
-            Topology::Segment => "Polyline",
-            Topology::Triangle => "Triangle",
-            Topology::Quadrilateral => "Quadrilateral",
-            Topology::Tetrahedron => "Tetrahedron",
-            Topology::Hexahedron => "Hexahedron",
-        }
-    }
-
-    pub fn nodes_per_element(self) -> usize {
-        match self {
-            Topology::Polyvertex => 1,
-            Topology::Segment => 2,
-            Topology::Triangle => 3,
-            Topology::Quadrilateral | Topology::Tetrahedron => 4,
-            Topology::Hexahedron => 8,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Center {
-    Node,
-    Cell,
-}
-
-/// A field over nodes or cells.
-#[derive(Debug, Clone)]
-pub struct Attribute {
-    pub name: String,
-    pub center: Center,
-    pub data: DataItem,
-}
-
-/// Everything there is to see at one time.
-#[derive(Debug, Clone)]
-pub struct Snapshot {
-    pub step: usize,
-    /// s, or the load factor in quasi-static runs
-    pub time: f64,
-    pub topology: Topology,
-    pub connectivity: DataItem,
-    pub geometry: DataItem,
-    pub attributes: Vec<Attribute>,
-}
-
-/// An XDMF file that grows by one snapshot at a time and is whole at any moment.
-#[derive(Debug)]
-pub struct XdmfSeries {
-    file: GrowingFile,
-    /// Step and XML of each snapshot; on rank 0 only.
-    snapshots: Vec<(usize, String)>,
-    /// The file holds later ones.
-    longer: bool,
-}
-
-impl XdmfSeries {
-    pub fn new(path: &Path) -> Self {
-        Self {
-            file: GrowingFile::new(path, SERIES_HEAD, TAIL),
-            snapshots: Vec::new(),
-            longer: false,
-        }
-    }
-
-    /// Continues the series of an earlier run, up to and including `last_step`. A file that is gone
-    /// is begun anew, which is said where frames (`frames` begins their names) were written before.
-    /// Nothing is written before [`Self::cut`].
-    pub fn resume(
-        path: &Path,
-        frames: &str,
-        last_step: usize,
-        log: &mut Log,
-        comm: &SimpleCommunicator,
-    ) -> Result<Self> {
-        let mut series = Self::new(path);
-        on_root(comm, || {
-            if path.exists() {
-                let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
-                let all = split_snapshots(&text).ok_or_else(|| not_ours(path))?;
-                let before = all.len();
-                series.snapshots = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
-                series.longer = series.snapshots.len() < before;
-                series.file.assume(texts(&series.snapshots));
-            } else if has_frames(path, frames, last_step)? {
-                log.say(&format!(
-                    "warning: {} is not there: the series begins anew after step {last_step}, and \
-                     does not show the earlier frames",
-                    path.display()
-                ));
-            }
-            Ok(())
-        })?;
-        Ok(series)
-    }
-
-    /// Takes what comes later out of the file.
-    pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
-        on_root(comm, || {
-            if self.longer {
-                self.file.replace(texts(&self.snapshots))?;
-                self.longer = false;
-            }
-            Ok(())
-        })
-    }
-
-    /// Adds a snapshot.
-    pub fn push(&mut self, snapshot: &Snapshot, comm: &SimpleCommunicator) -> Result<()> {
-        on_root(comm, || {
-            self.snapshots.push((snapshot.step, snapshot_xml(snapshot)));
-            self.file.push(texts(&self.snapshots))
-        })
-    }
-}
-
-/// True if a frame up to `last_step` lies beside the series.
-fn has_frames(path: &Path, begin: &str, last_step: usize) -> Result<bool> {
-    let folder = path.parent().unwrap_or(Path::new("."));
-    let names = names_in(folder)?;
-    Ok(names.iter().any(|name| number_of(name, begin).is_some_and(|n| n <= last_step)))
-}
-
-fn texts(snapshots: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
-    snapshots.iter().map(|(_, text)| text.as_str())
-}
+use super::frame::{Array, Frame, Number, Totals};
+use super::frame_series::StepTime;
 
 const GRID_START: &str = "      <Grid Name=\"step ";
 const GRID_END: &str = "      </Grid>\n";
+/// Closes what [`SERIES_HEAD`](crate::output::names::SERIES_HEAD) opens.
+pub const TAIL: &str = "    </Grid>\n  </Domain>\n</Xdmf>\n";
 
-/// How every series ends.
-const TAIL: &str = "    </Grid>\n  </Domain>\n</Xdmf>\n";
-
-fn snapshot_xml(snapshot: &Snapshot) -> String {
-    let topology = snapshot.topology;
+/// The text of a frame whose data lie in the HDF5 file `data`, named without folder.
+pub fn piece(
+    (step, time): StepTime,
+    frame: &Frame<'_>,
+    (points, cells): Totals,
+    data: &str,
+) -> String {
+    let each = frame.topology.points_per_cell();
     let mut xml = String::new();
-    // Writing to a String cannot fail.
     let _ = write!(
         xml,
-        "{GRID_START}{}\" GridType=\"Uniform\">\n        <Time Value=\"{:e}\"/>\n        \
-         <Topology TopologyType=\"{}\" NumberOfElements=\"{}\" NodesPerElement=\"{}\">\n{}        \
+        "{GRID_START}{step}\" GridType=\"Uniform\">\n        <Time Value=\"{time:e}\"/>\n        \
+         <Topology TopologyType=\"{}\" NumberOfElements=\"{cells}\" NodesPerElement=\"{each}\">\n{}        \
          </Topology>\n        <Geometry GeometryType=\"XYZ\">\n{}        </Geometry>\n",
-        snapshot.step,
-        snapshot.time,
-        topology.name(),
-        snapshot.connectivity.rows,
-        topology.nodes_per_element(),
-        data_xml(&snapshot.connectivity),
-        data_xml(&snapshot.geometry),
+        frame.topology.xdmf_name(),
+        item("Int", (cells, each), data, frame.nodes),
+        item("Float", (points, 3), data, frame.places.name),
     );
-    for attribute in &snapshot.attributes {
-        let kind = match attribute.data.columns {
-            1 => "Scalar",
-            3 => "Vector",
-            6 => "Tensor6",
-            9 => "Tensor",
-            _ => "Matrix",
-        };
-        let center = match attribute.center {
-            Center::Node => "Node",
-            Center::Cell => "Cell",
-        };
-        let _ = write!(
-            xml,
-            "        <Attribute Name=\"{}\" AttributeType=\"{kind}\" Center=\"{center}\">\n{}        \
-             </Attribute>\n",
-            escape(&attribute.name),
-            data_xml(&attribute.data),
-        );
-    }
+    let mut attributes = |arrays: &[Array<'_>], center: &str, rows: usize| {
+        for array in arrays {
+            let kind = match array.columns {
+                1 => "Scalar",
+                3 => "Vector",
+                6 => "Tensor6",
+                9 => "Tensor",
+                _ => "Matrix",
+            };
+            let number = if array.number == Number::Float { "Float" } else { "Int" };
+            let _ = write!(
+                xml,
+                "        <Attribute Name=\"{}\" AttributeType=\"{kind}\" Center=\"{center}\">\n{}        \
+                 </Attribute>\n",
+                escape(array.name),
+                item(number, (rows, array.columns), data, array.name),
+            );
+        }
+    };
+    attributes(&frame.point_data, "Node", points);
+    attributes(&frame.cell_data, "Cell", cells);
     xml.push_str(GRID_END);
     xml
 }
 
-fn data_xml(data: &DataItem) -> String {
-    let number = match data.number {
-        Number::Float => "Float",
-        Number::Int => "Int",
-    };
-    let dimensions = match data.columns {
-        1 => data.rows.to_string(),
-        columns => format!("{} {columns}", data.rows),
+fn item(number: &str, (rows, columns): (usize, usize), file: &str, dataset: &str) -> String {
+    let dimensions = match columns {
+        1 => rows.to_string(),
+        columns => format!("{rows} {columns}"),
     };
     format!(
         "          <DataItem Dimensions=\"{dimensions}\" NumberType=\"{number}\" Precision=\"8\" \
          Format=\"HDF\">{}:/{}</DataItem>\n",
-        escape(&data.file),
-        escape(&data.dataset),
+        escape(file),
+        escape(dataset),
     )
 }
 
-/// Step and XML of every snapshot of a file that [`XdmfSeries`] wrote.
-fn split_snapshots(text: &str) -> Option<Vec<(usize, String)>> {
-    let mut snapshots = Vec::new();
+/// Step and text of each frame of a series; `None` if the text is no such series.
+pub fn split(text: &str) -> Option<Vec<(usize, String)>> {
+    let mut pieces = Vec::new();
     let mut rest = text;
     while let Some(start) = rest.find(GRID_START) {
         let end = start + rest[start..].find(GRID_END)? + GRID_END.len();
         let step = rest[start + GRID_START.len()..].split('"').next()?.parse().ok()?;
-        snapshots.push((step, rest[start..end].to_owned()));
+        pieces.push((step, rest[start..end].to_owned()));
         rest = &rest[end..];
     }
-    text.contains("CollectionType=\"Temporal\"").then_some(snapshots)
-}
-
-fn not_ours(path: &Path) -> Error {
-    Error::File(format!(
-        "{} is not a time series that this program wrote: restore it, or move it away and the \
-         series starts anew",
-        path.display()
-    ))
+    text.contains("CollectionType=\"Temporal\"").then_some(pieces)
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::frame::Topology;
     use super::*;
+    use crate::output::names::SERIES_HEAD;
 
-    fn snapshot(step: usize) -> Snapshot {
-        let item = |number, columns, dataset: &str| DataItem {
-            number,
-            rows: 7,
-            columns,
-            file: format!("points-{step:06}.h5"),
-            dataset: dataset.into(),
-        };
-        Snapshot {
-            step,
-            time: 0.1 * step as f64,
+    fn text(step: usize) -> String {
+        let stress = Array { columns: 6, ..Array::floats("a<b", Vec::new) };
+        let frame = Frame {
             topology: Topology::Polyvertex,
-            connectivity: item(Number::Int, 1, "vertices"),
-            geometry: item(Number::Float, 3, "position"),
-            attributes: vec![Attribute {
-                name: "a<b".into(),
-                center: Center::Node,
-                data: item(Number::Float, 6, "stress"),
-            }],
-        }
+            points: 0,
+            cells: 0,
+            places: Array::vectors::<3>("position", &[]),
+            nodes: "vertices",
+            connectivity: None,
+            point_data: vec![stress],
+            cell_data: Vec::new(),
+        };
+        piece((step, 0.1 * step as f64), &frame, (7, 7), &format!("points-{step:06}.h5"))
     }
 
     #[test]
-    fn a_series_is_split_into_the_snapshots_it_was_made_of() {
-        let parts: Vec<_> = [0, 5, 10].map(|s| (s, snapshot_xml(&snapshot(s)))).to_vec();
-        let series_xml = |parts: &[(usize, String)]| {
-            format!("{SERIES_HEAD}{}{TAIL}", texts(parts).collect::<String>())
+    fn a_series_is_split_into_the_pieces_it_was_made_of() {
+        let pieces: Vec<_> = [0, 5, 10].map(|step| (step, text(step))).to_vec();
+        let series = |pieces: &[(usize, String)]| {
+            let texts: String = pieces.iter().map(|(_, text)| text.as_str()).collect();
+            format!("{SERIES_HEAD}{texts}{TAIL}")
         };
-        assert_eq!(split_snapshots(&series_xml(&parts)), Some(parts));
-        assert_eq!(split_snapshots("<Xdmf/>"), None);
-        assert_eq!(split_snapshots(&series_xml(&[])), Some(vec![]));
+        assert_eq!(split(&series(&pieces)), Some(pieces));
+        assert_eq!(split("<Xdmf/>"), None);
+        assert_eq!(split(&series(&[])), Some(vec![]));
     }
 
     #[test]
     fn the_text_follows_the_rules() {
-        let xml = snapshot_xml(&snapshot(5));
+        let xml = text(5);
         for part in [
             "<Topology TopologyType=\"Polyvertex\" NumberOfElements=\"7\" NodesPerElement=\"1\">",
             "<Attribute Name=\"a&lt;b\" AttributeType=\"Tensor6\" Center=\"Node\">",
             "Dimensions=\"7 6\" NumberType=\"Float\" Precision=\"8\" Format=\"HDF\">\
-             points-000005.h5:/stress</DataItem>",
+             points-000005.h5:/a&lt;b</DataItem>",
             "<Time Value=\"5e-1\"/>",
         ] {
             assert!(xml.contains(part), "{part} is missing from\n{xml}");

@@ -50,19 +50,13 @@ impl CsvTable {
     ///
     /// # Errors
     /// `File` if the file has other columns.
-    pub fn resume(
-        path: &Path,
-        header: &[String],
-        mark: Mark,
-        log: &mut Log,
-        comm: &SimpleCommunicator,
-    ) -> Result<Self> {
-        let mut table = Self::create(path, header)?;
+    pub fn resume(&mut self, mark: Mark, log: &mut Log, comm: &SimpleCommunicator) -> Result<()> {
+        let path = &self.path;
         let mut found = 0;
         on_root(comm, || {
             if path.exists() {
                 let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
-                (table.start, found) = kept(path, &text, &table.start, header.len(), mark)?;
+                (self.start, found) = kept(path, &text, &self.start, self.columns, mark)?;
             }
             Ok(())
         })?;
@@ -75,8 +69,8 @@ impl CsvTable {
                 mark.rows
             ));
         }
-        table.mark = Mark { rows: found, ..mark };
-        Ok(table)
+        self.mark = Mark { rows: found, ..mark };
+        Ok(())
     }
 
     /// Writes what the table begins with, and is ready for more.

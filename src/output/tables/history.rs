@@ -2,11 +2,10 @@
 
 use mpi::topology::SimpleCommunicator;
 
-use super::csv_table::{CsvTable, Mark};
+use super::csv_table::CsvTable;
 use crate::deck::model::{Contact, Partner};
 use crate::error::Result;
 use crate::output::directory::{HISTORY, ResultsDirectory};
-use crate::output::terminal::log::Log;
 
 /// What a run's history holds besides the columns that every run has.
 #[derive(Debug, Clone, Default)]
@@ -284,19 +283,6 @@ impl History {
     /// A new history. Nothing is written before [`CsvTable::open`].
     pub fn create(directory: &ResultsDirectory, layout: HistoryColumns) -> Result<Self> {
         let table = CsvTable::create(&directory.file(HISTORY), &header(&layout))?;
-        Ok(Self { layout, table })
-    }
-
-    /// Continues the history of a run up to `mark`: [`CsvTable::resume`].
-    pub fn resume(
-        directory: &ResultsDirectory,
-        layout: HistoryColumns,
-        mark: Mark,
-        log: &mut Log,
-        comm: &SimpleCommunicator,
-    ) -> Result<Self> {
-        let path = directory.file(HISTORY);
-        let table = CsvTable::resume(&path, &header(&layout), mark, log, comm)?;
         Ok(Self { layout, table })
     }
 

@@ -2,10 +2,9 @@
 
 use mpi::topology::SimpleCommunicator;
 
-use super::csv_table::{CsvTable, Mark};
+use super::csv_table::CsvTable;
 use crate::error::Result;
 use crate::output::directory::{RESIDUALS, ResultsDirectory};
-use crate::output::terminal::log::Log;
 
 /// The open list of residuals.
 #[derive(Debug)]
@@ -16,18 +15,8 @@ pub struct Residuals {
 impl Residuals {
     /// A new list. Nothing is written before [`CsvTable::open`].
     pub fn create(directory: &ResultsDirectory) -> Result<Self> {
-        Ok(Self { table: CsvTable::create(&directory.file(RESIDUALS), &header())? })
-    }
-
-    /// Continues the list of a run up to `mark`: [`CsvTable::resume`].
-    pub fn resume(
-        directory: &ResultsDirectory,
-        mark: Mark,
-        log: &mut Log,
-        comm: &SimpleCommunicator,
-    ) -> Result<Self> {
-        let path = directory.file(RESIDUALS);
-        Ok(Self { table: CsvTable::resume(&path, &header(), mark, log, comm)? })
+        let header = ["step [-]", "iteration [-]", "residual [-]"].map(String::from);
+        Ok(Self { table: CsvTable::create(&directory.file(RESIDUALS), &header)? })
     }
 
     /// Appends the residuals of one step; the first belongs to iteration 0, at zero displacement.
@@ -46,8 +35,4 @@ impl Residuals {
         let rows: Vec<&[f64]> = rows.iter().map(|row| &row[..]).collect();
         self.table.push_all(&rows, comm)
     }
-}
-
-fn header() -> Vec<String> {
-    ["step [-]", "iteration [-]", "residual [-]"].map(String::from).to_vec()
 }

@@ -1,5 +1,7 @@
 //! Frames of the points, of the grid and of rigid bodies.
 
+use mpi::topology::Communicator;
+
 use crate::contact::pose::Pose;
 use crate::deck::model::Every;
 use crate::error::Result;
@@ -36,7 +38,7 @@ impl Recorder {
         time: f64,
         points: &Points<D>,
     ) -> Result<()> {
-        self.points.write(step, time, points, world.comm())
+        self.points.write((step, time), points, world.comm())
     }
 
     /// Writes the surfaces of the rigid bodies in their `poses`.
@@ -49,7 +51,7 @@ impl Recorder {
     ) -> Result<()> {
         let Some(series) = &mut self.rigid else { return Ok(()) };
         let frame = surfaces(model, poses, self.stage);
-        series.write(step, time, &frame, world.comm())
+        series.write((step, time), &frame.shown(world.is_root()), world.comm())
     }
 
     /// Writes the active grid of the step just solved, on the `grid` that it was solved on.
@@ -102,6 +104,6 @@ impl Recorder {
             ghost_boundary: &cells,
             cell_fields: &[],
         };
-        self.grid.write(step, time, &frame, world.comm())
+        self.grid.write((step, time), &frame.shown(world.comm().rank()), world.comm())
     }
 }

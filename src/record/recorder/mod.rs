@@ -25,9 +25,8 @@ use crate::deck::model::Every;
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
 use crate::output::restart::run_state::RunState;
-use crate::output::series::grid_file::GridSeries;
+use crate::output::series::frame_series::Series;
 use crate::output::series::points_file::PointsSeries;
-use crate::output::series::rigid_file::RigidSeries;
 use crate::output::summary::Count;
 use crate::output::tables::history::{History, HistoryRow};
 use crate::output::tables::residuals::Residuals;
@@ -47,9 +46,9 @@ pub struct Recorder {
     residuals: Residuals,
     probes: Option<Probes>,
     points: PointsSeries,
-    grid: GridSeries,
+    grid: Series,
     /// Of a deck with rigid bodies.
-    rigid: Option<RigidSeries>,
+    rigid: Option<Series>,
     progress: Progress,
     every: Every,
     last_frame: f64,
@@ -214,7 +213,7 @@ impl Recorder {
     /// Rows and frames from now on belong to this stage; stages are counted from zero.
     pub fn enter_stage(&mut self, stage: usize) {
         self.stage = stage;
-        self.points.stage = self.staged.then_some(stage as u64 + 1);
+        self.points.enter_stage(self.staged.then_some(stage as u64 + 1));
     }
 
     /// The present stage, from zero.

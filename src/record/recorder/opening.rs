@@ -1,14 +1,13 @@
 //! The files of a run, fresh or continued.
 
 use crate::deck::Deck;
-use crate::deck::model::{AnalysisType, Every, Symmetry};
+use crate::deck::model::{AnalysisType, Every, Format, Symmetry};
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
 use crate::output::restart::run_state::RunState;
-use crate::output::series::grid_file::GridSeries;
+use crate::output::series::frame_series::Series;
 use crate::output::series::point_field::PointField;
 use crate::output::series::points_file::PointsSeries;
-use crate::output::series::rigid_file::RigidSeries;
 use crate::output::summary::Count;
 use crate::output::tables::csv_table::Mark;
 use crate::output::tables::history::{ContactName, History, HistoryColumns};
@@ -70,50 +69,31 @@ impl Recorder {
             reduced: deck.analysis.kind == AnalysisType::StrengthReduction,
         };
         let fields = PointField::parse_list(&deck.output.fields)?;
-        let (basis, dimension) = (deck.method.basis, deck.dimension);
         let formats = &deck.output.formats;
         let goes_on = resume.as_ref().filter(|resume| resume.same_directory);
-        let (history, residuals, points, grid) = match goes_on {
-            None => (
-                History::create(&directory, layout)?,
-                Residuals::create(&directory)?,
-                PointsSeries::create(&directory, &fields, formats, basis, dimension),
-                GridSeries::create(&directory, formats),
-            ),
-            Some(Resume { state, .. }) => {
-                let count = |name: &str| state.count(name).map(|n| n as usize);
-                let step = count("recorder.steps")?;
-                let mark = |table: &str| -> Result<Mark> {
-                    let rows = count(&format!("recorder.{table}_rows"))?;
-                    // Not known to the first checkpoints of this format.
-                    let step = count(&format!("recorder.{table}_step")).unwrap_or(usize::MAX);
-                    Ok(Mark { rows, step })
-                };
-                let (history, residuals) = (mark("history")?, mark("residual")?);
-                (
-                    History::resume(&directory, layout, history, &mut log, comm)?,
-                    Residuals::resume(&directory, residuals, &mut log, comm)?,
-                    PointsSeries::resume(
-                        &directory,
-                        &fields,
-                        formats,
-                        (basis, dimension),
-                        step,
-                        &mut log,
-                        comm,
-                    )?,
-                    GridSeries::resume(&directory, formats, step, &mut log, comm)?,
-                )
-            }
-        };
-        let rigid = match (deck.rigids.is_empty(), goes_on) {
-            (true, _) => None,
-            (false, None) => Some(RigidSeries::create(&directory)),
-            (false, Some(Resume { state, .. })) => {
-                let step = state.count("recorder.steps")? as usize;
-                Some(RigidSeries::resume(&directory, step, &mut log, comm)?)
-            }
-        };
+        let mut history = History::create(&directory, layout)?;
+        let mut residuals = Residuals::create(&directory)?;
+        let kind = (deck.method.basis, deck.dimension);
+        let mut points = PointsSeries::create(&directory, &fields, formats, kind);
+        let mut grid = Series::create(&directory, ("grid", "grid"), formats);
+        let mut rigid = (!deck.rigids.is_empty())
+            .then(|| Series::create(&directory, ("rigid", "rigid"), &[Format::Xdmf]));
+        if let Some(Resume { state, .. }) = goes_on {
+            let count = |name: &str| state.count(name).map(|n| n as usize);
+            let step = count("recorder.steps")?;
+            let mark = |table: &str| -> Result<Mark> {
+                let rows = count(&format!("recorder.{table}_rows"))?;
+                // Not known to the first checkpoints of this format.
+                let step = count(&format!("recorder.{table}_step")).unwrap_or(usize::MAX);
+                Ok(Mark { rows, step })
+            };
+            let (of_history, of_residuals) = (mark("history")?, mark("residual")?);
+            history.table.resume(of_history, &mut log, comm)?;
+            residuals.table.resume(of_residuals, &mut log, comm)?;
+            points.resume(step, &mut log, comm)?;
+            grid.resume(step, &mut log, comm)?;
+            rigid.as_mut().map_or(Ok(()), |series| series.resume(step, &mut log, comm))?;
+        }
         let state = goes_on.map(|resume| &resume.state);
         let probes = Probes::new(world, deck, &followed, &directory, state, &mut log)?;
         let same_directory = goes_on.is_some();
