@@ -23,6 +23,7 @@ use mpm_par::system::model::Model;
 use mpm_par::system::plain;
 use mpm_par::system::scatter::{self, BlockMatrix};
 use mpm_par::system::step_system::Discretisation;
+use mpm_par::system::terms::declaration::Context;
 use mpm_par::system::terms::ghost::ghost_matrix;
 use mpm_par::system::terms::stress;
 use mpm_par::system::unknowns::Unknowns;
@@ -217,12 +218,13 @@ fn in_place<const D: usize>(world: &World, basis: &str) -> Result<()> {
     let external = vec![0.0; owned];
     let grid = &model.grid;
     let unknowns = Unknowns::displacements();
+    let of = Context::new(world, &model, (&mesh, &points), span);
     let equations = StepEquations {
         unknowns,
         conditions: &conditions,
         left_out: &left_out,
         external_owned: external,
-        terms: motion::terms(world, &mesh, step, (frame, true), Vec::new())?,
+        terms: motion::terms(of, (frame, true), Vec::new())?,
         following: None,
     };
     let mut problem = Equilibrium::<D>::new(world, grid, &mesh, equations, settings);

@@ -1,4 +1,4 @@
-//! Decks that are wrong: the messages, word for word.
+//! Decks that are wrong: exit code, place, key and the words that matter. Two messages are compared whole, for their layout.
 
 use std::path::Path;
 
@@ -22,6 +22,20 @@ fn replaced(from: &str, to: &str) -> String {
     message(&BEAM.replacen(from, to, 1), &[])
 }
 
+/// The message of that deck, whose words these are, in their order.
+fn replaced_says(from: &str, to: &str, words: &[&str]) {
+    says(&replaced(from, to), words);
+}
+
+fn says(message: &str, words: &[&str]) {
+    let mut rest = message;
+    for word in words {
+        let at = rest.find(word);
+        let at = at.unwrap_or_else(|| panic!("\"{word}\" is not, or not there, in:\n{message}"));
+        rest = &rest[at + word.len()..];
+    }
+}
+
 #[test]
 fn malformed_toml() {
     assert_eq!(
@@ -40,32 +54,27 @@ beam.toml:5:9: not valid TOML: extra `=`, expected nothing
 
 #[test]
 fn unknown_key_names_the_nearest() {
-    assert_eq!(
-        replaced("tolerance = 1e-9", "tolerence = 1e-9"),
-        "\
+    let found = replaced("tolerance = 1e-9", "tolerence = 1e-9");
+    let layout = "\
 beam.toml:6:1: analysis.tolerence: unknown key \"tolerence\"
    |
  6 | tolerence = 1e-9
    | ^^^^^^^^^
    = did you mean \"tolerance\"?
-   = known keys of [analysis]: type, symmetry, steps, duration, cfl, tolerance, max_iterations, on_failure, \
-smallest_step, inverted_iterates, tangent, newmark_beta, newmark_gamma, hht_alpha, strength_tolerance, damping"
-    );
+   = known keys of [analysis]: type, ";
+    assert!(found.starts_with(layout), "{found}");
 }
 
 #[test]
 fn key_of_another_section_is_sent_there() {
-    assert_eq!(
-        replaced("poisson = 0.2", "poisson = 0.2\ndensity = 1"),
-        "\
-beam.toml:29:1: material.steel.density: unknown key \"density\"
-    |
- 29 | density = 1
-    | ^^^^^^^
-   = \"density\" belongs to [[body]]
-   = known keys of [material.NAME]: model, young, poisson, yield, yield_stress, \
-shear_strength, hardening, saturation, softening, friction, dilation, cohesion, tension, fit, slope, \
-compression, swelling, preconsolidation, ocr, elasticity, reference_pressure, shear"
+    replaced_says(
+        "poisson = 0.2",
+        "poisson = 0.2\ndensity = 1",
+        &[
+            "beam.toml:29:1: material.steel.density",
+            "\"density\" belongs to [[body]]",
+            "known keys of [material.NAME]: model, young",
+        ],
     );
 }
 
@@ -162,121 +171,96 @@ fn a_manufactured_field_has_derivatives() {
 
 #[test]
 fn wrong_type() {
-    assert_eq!(
-        replaced("tolerance = 1e-9", "tolerance = \"small\""),
-        "\
-beam.toml:6:13: analysis.tolerance: expected a number > 0, found the string \"small\"
-   |
- 6 | tolerance = \"small\"
-   |             ^^^^^^^"
+    replaced_says(
+        "tolerance = 1e-9",
+        "tolerance = \"small\"",
+        &["beam.toml:6:13: analysis.tolerance: ", "a number > 0", "the string \"small\""],
     );
 }
 
 #[test]
 fn poisson_of_a_half() {
-    assert_eq!(
-        replaced("poisson = 0.2", "poisson = 0.5"),
-        "\
-beam.toml:28:11: material.steel.poisson: expected a number > -1 and < 0.5, found 0.5
-    |
- 28 | poisson = 0.5
-    |           ^^^"
+    replaced_says(
+        "poisson = 0.2",
+        "poisson = 0.5",
+        &["beam.toml:28:11: material.steel.poisson: ", "> -1 and < 0.5", "found 0.5"],
     );
 }
 
 #[test]
 fn unknown_word() {
-    assert_eq!(
-        replaced("basis = \"gimp\"", "basis = \"gmip\""),
-        "\
-beam.toml:12:9: method.basis: expected one of \"mpm\", \"gimp\", \"cpdi1\", \"cpdi2\", found \"gmip\"
-    |
- 12 | basis = \"gmip\"
-    |         ^^^^^^
-   = did you mean \"gimp\"?"
+    replaced_says(
+        "basis = \"gimp\"",
+        "basis = \"gmip\"",
+        &[
+            "beam.toml:12:9: method.basis: ",
+            "\"mpm\", \"gimp\"",
+            "\"gmip\"",
+            "did you mean \"gimp\"?",
+        ],
     );
 }
 
 #[test]
 fn wrong_dimension() {
-    assert_eq!(
-        replaced("max = [10, 10]", "max = [10, 10, 1]"),
-        "\
-beam.toml:33:39: body.0.shape.box.max: expected 2 values, one per axis (2D, from [grid]), found 3
-    |
- 33 | shape = { box = { min = [0, 9], max = [10, 10, 1] } }
-    |                                       ^^^^^^^^^^^"
+    replaced_says(
+        "max = [10, 10]",
+        "max = [10, 10, 1]",
+        &["beam.toml:33:39: body.0.shape.box.max: ", "2 values", "2D", "found 3"],
     );
 }
 
 #[test]
 fn size_that_is_not_whole_cells() {
-    assert_eq!(
-        replaced("size = [11.0, 10.0]", "size = [11.3, 10.0]"),
-        "\
-beam.toml:22:8: grid.size: expected whole cells, found 11.3 m along x with h = 0.5 m, which is \
-22.600000 cells; nearest: 11 or 11.5 m
-    |
- 22 | size = [11.3, 10.0]
-    |        ^^^^^^^^^^^^"
+    replaced_says(
+        "size = [11.0, 10.0]",
+        "size = [11.3, 10.0]",
+        &["beam.toml:22:8: grid.size: ", "11.3 m along x", "22.600000 cells", "11 or 11.5 m"],
     );
 }
 
 #[test]
 fn missing_section_and_its_misspelling() {
-    assert_eq!(
-        replaced("[grid]\n", "[gird]\n"),
-        "\
-beam.toml:19:2: gird: unknown key \"gird\"
-    |
- 19 | [gird]
-    |  ^^^^
-   = did you mean \"grid\"?
-   = known keys of the top level: title, analysis, method, ghost, grid, material, body, boundary, \
-load, rigid, contact, water, stage, verify, probe, output, parallel, petsc, conditioning, element_test
-beam.toml: grid: missing section [grid]
-   = Background grid."
+    replaced_says(
+        "[grid]\n",
+        "[gird]\n",
+        &[
+            "beam.toml:19:2: gird: unknown key",
+            "did you mean \"grid\"?",
+            "known keys of the top level: title, analysis",
+            "beam.toml: grid: missing section [grid]",
+        ],
     );
-    assert_eq!(
-        message("", &[]),
-        "\
-beam.toml: analysis: missing section [analysis]
-   = What is solved, and how finely.
-beam.toml: material: missing tables, each under a name of its own; expected a [material.NAME]
-   = At least one `[material.NAME]`.
-beam.toml: grid: missing section [grid]
-   = Background grid."
+    says(
+        &message("", &[]),
+        &[
+            "beam.toml: analysis: missing section [analysis]",
+            "beam.toml: material: missing",
+            "[material.NAME]",
+            "beam.toml: grid: missing section [grid]",
+        ],
     );
 }
 
 #[test]
 fn no_boundary_condition_is_a_singular_system() {
-    assert_eq!(
-        message(BEAM, &["boundary="]),
-        "\
-beam.toml: boundary: no [[boundary]]: nothing holds the bodies, so that the quasi-static system \
-is singular (any rigid motion solves it)
-   = for example a [[boundary]] with fix = [\"x\", \"y\"]"
+    says(
+        &message(BEAM, &["boundary="]),
+        &["beam.toml: boundary: no [[boundary]]", "singular", "fix = [\"x\", \"y\"]"],
     );
-    assert_eq!(
-        message(BEAM, &["boundary.1="]),
-        "\
-beam.toml: boundary: no [[boundary]] holds y: the bodies can move rigidly along it, so that the \
-quasi-static system is singular
-   = for example a [[boundary]] with fix = [\"y\"]"
+    says(
+        &message(BEAM, &["boundary.1="]),
+        &["beam.toml: boundary: no [[boundary]] holds y", "singular", "fix = [\"y\"]"],
     );
 }
 
 #[test]
 fn options_are_named_in_messages() {
-    assert_eq!(
-        message(BEAM, &["method.frame=total", "analysis.steps=0"]),
-        "--set analysis.steps=0: analysis.steps: expected a whole number >= 1, found 0"
+    says(
+        &message(BEAM, &["method.frame=total", "analysis.steps=0"]),
+        &["--set analysis.steps=0: analysis.steps: ", ">= 1", "found 0"],
     );
-    assert_eq!(
-        message(BEAM, &["method.basis"]),
-        "--set method.basis: expected KEY=VALUE, for example --set method.basis=gimp"
-    );
+    says(&message(BEAM, &["method.basis"]), &["--set method.basis: ", "KEY=VALUE"]);
 }
 
 /// Every key of the schema that only some choices read is refused with the others, in the deck and

@@ -25,10 +25,10 @@ use mpm_par::system::held::Held;
 use mpm_par::system::in_place::{InPlace, RowAddresses};
 use mpm_par::system::model::Model;
 use mpm_par::system::scatter::{BlockMatrix, BlockRows, add_support};
+use mpm_par::system::step_points::StepPoints;
 use mpm_par::system::step_system::Discretisation;
 use mpm_par::system::terms::block::add_block;
 use mpm_par::system::terms::ghost::{Ghost, ghost_matrix};
-use mpm_par::system::terms::stress::StepPoints;
 use mpm_par::system::terms::term::{At, Health, Part, Term};
 use mpm_par::system::unknowns::Unknowns;
 

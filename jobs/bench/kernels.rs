@@ -15,6 +15,7 @@ use limits::Machine;
 use mpm_par::analysis::equilibrium::{Equilibrium, NewtonSettings, StepEquations, motion};
 use mpm_par::analysis::solver;
 use mpm_par::error::Result;
+use mpm_par::mechanics::displacement_gradient;
 use mpm_par::mechanics::{self, StepStart};
 use mpm_par::parallel::World;
 use mpm_par::petsc::Session;
@@ -26,7 +27,8 @@ use mpm_par::system::model::Model;
 use mpm_par::system::numbering::Numbering;
 use mpm_par::system::scatter::BlockMatrix;
 use mpm_par::system::step_system::Discretisation;
-use mpm_par::system::terms::stress::{self, displacement_gradient};
+use mpm_par::system::terms::declaration::Context;
+use mpm_par::system::terms::stress;
 use mpm_par::system::unknowns::Unknowns;
 use mpm_par::transfer::update;
 use mpm_par::{basis, deck};
@@ -350,7 +352,8 @@ fn measure<const D: usize>(world: &World, case: &Case) -> Result<Costs> {
     let (of, unknowns) = ((numbering, &mesh.pattern), Unknowns::displacements());
     let empty = || solver::matrix(world, &model.grid, of, unknowns, true);
     let equations = || -> Result<_> {
-        let terms = motion::terms(world, &mesh, step, (frame, true), Vec::new())?;
+        let context = Context::new(world, &model, (&mesh, step.points), SPAN);
+        let terms = motion::terms(context, (frame, true), Vec::new())?;
         let equations = StepEquations {
             unknowns,
             conditions: &conditions,

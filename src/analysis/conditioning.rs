@@ -15,6 +15,7 @@ use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::scatter::{self, BlockMatrix};
+use crate::system::step_points::StepPoints;
 use crate::system::terms::stress;
 
 use super::extremes::{Extremes, Reduced};
@@ -255,7 +256,7 @@ impl<const D: usize> System<D> {
         grid: &Grid<D>,
         mesh: &Discretisation<D>,
         matrix: &BlockMatrix<1>,
-        step: stress::StepPoints<'_, D>,
+        step: StepPoints<'_, D>,
     ) -> Result<f64> {
         let numbering = &mesh.numbering;
         let (free, solver) = (vec![false; numbering.len() * D], &mut MassSolver::default());

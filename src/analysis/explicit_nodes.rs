@@ -9,7 +9,7 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::system::conditions::Conditions;
-use crate::system::terms::stress::StepPoints;
+use crate::system::step_points::StepPoints;
 use crate::tensor::Square;
 
 use crate::mass::grid_mass::{GridMass, Inverse, require_mass};
@@ -24,6 +24,7 @@ use crate::transfer::affine::{self, Affine};
 use crate::transfer::mapping::{self, Deformation, Pushed};
 use crate::transfer::nodal_sums::{over_points, to_points};
 use crate::transfer::refusal::Halt;
+use crate::transfer::soundness;
 use crate::transfer::transport::Carrier;
 use crate::transfer::update::{self, PointEnergies};
 
@@ -38,7 +39,8 @@ pub(crate) struct Nodes<'a, const D: usize> {
     pub inverse: Inverse<'a, D>,
     /// Of the points, N; empty without loads.
     external: &'a [[f64; D]],
-    /// Force of pressures at the step's start, N: of the owned degrees of freedom, empty for none.
+    /// Force at the step's start of what follows the motion, of declared terms and of contact, N: of the owned degrees
+    /// of freedom, empty for none.
     pub pressed: &'a [f64],
     /// Local nodes of fields that move as one ([`shared_nodes::joined`]).
     pub joined: Vec<Vec<usize>>,
@@ -237,7 +239,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         let rows = &mut deformation.common;
         let common = mapping::common_changes(step, &deforming, Some(rows));
         let averaged = update::averaged(&common, &deformation);
-        update::require_sound_deformation(self.world, points, &deformation, &averaged)?;
+        soundness::require_sound_deformation(self.world, points, &deformation, &averaged)?;
         let straining = update::straining(&deformation, &averaged);
         update::stretch(&deformation, points, Some(before));
         let energies = update::respond(&self.model.materials, straining, points, Some(before));
@@ -295,7 +297,7 @@ impl<'a, const D: usize> Nodes<'a, D> {
         Ok(momentum)
     }
 
-    /// Adds the pressures.
+    /// Adds what acts on the nodes themselves.
     fn press(&self, sums: &mut [[f64; D]]) {
         let sums = sums.as_flattened_mut();
         sums.iter_mut().zip(self.pressed).for_each(|(sum, f)| *sum += f);

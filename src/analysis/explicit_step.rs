@@ -9,8 +9,9 @@ use crate::parallel::World;
 use crate::petsc::log::Phase;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
+use crate::system::step_points::StepPoints;
+use crate::system::terms::declaration::{self, Context};
 use crate::system::terms::following::Following;
-use crate::system::terms::stress::StepPoints;
 use crate::system::terms::touching::{self, OfBodies};
 
 use super::explicit_bodies::{AtNodes, meet};
@@ -32,6 +33,7 @@ use crate::system::step_system::{Coupling, Discretisation};
 use crate::transfer::affine::Affine;
 use crate::transfer::mapping::{self, Deformation, Pushed};
 use crate::transfer::refusal::{Cause, Halt, Refusal};
+use crate::transfer::soundness;
 use crate::transfer::transport::{self, Carrier};
 use crate::transfer::update::{self, Increments};
 
@@ -85,6 +87,11 @@ pub(crate) fn advance<const D: usize>(
     match pressed.is_empty() {
         true => pressed = counter,
         false => add(&mut pressed, 1.0, &counter),
+    }
+    let exerted = declaration::exerted(Context::new(world, model, (&mesh, points), span), None)?;
+    match pressed.is_empty() {
+        true => pressed = exerted,
+        false => add(&mut pressed, 1.0, &exerted),
     }
     let borne = supports_at_start(model, &mesh, points, span);
     let mut pushing = contact.begin(world, model, &mesh, points, span)?;
@@ -274,7 +281,7 @@ fn refuse<const D: usize>(
     moved: &[f64],
 ) -> std::result::Result<(), Halt> {
     let (grid, method) = (&model.grid, &model.deck.method);
-    update::require_sound(world, grid, &model.deck.boundaries, points, made)?;
+    soundness::require_sound(world, grid, &model.deck.boundaries, points, made)?;
     // With the stress updated first the points have the step's deformation already.
     let usf = method.stress_update == StressUpdate::Usf;
     let mut still = (usf && method.basis.domain() == Domain::Parallelepiped).then(|| Increments {
@@ -289,7 +296,7 @@ fn refuse<const D: usize>(
     let made = still.as_mut().unwrap_or(made);
     let numbering = &mesh.numbering;
     let grids = [grid; 2];
-    update::require_sound_domains(world, grids, method.basis, numbering, moved, points, made)?;
+    soundness::require_sound_domains(world, grids, method.basis, numbering, moved, points, made)?;
     Ok(())
 }
 

@@ -6,6 +6,7 @@ use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
+use crate::system::terms::declaration::{self, Context};
 use crate::system::terms::following::Following;
 use crate::transfer::mapping;
 
@@ -15,12 +16,13 @@ use super::release::{counter_force, owned, released, releases};
 pub(super) struct Loads<const D: usize> {
     /// On the points at the start.
     pub points_start: Vec<[f64; D]>,
-    /// This rank's share of what acts on nodes at the start (forces that follow the motion, later
-    /// contact), at the local nodes; empty without any.
+    /// This rank's share of what acts on nodes at the start (forces that follow the motion, those of declared
+    /// terms, later contact), at the local nodes; empty without any.
     pub nodes_start: Vec<f64>,
-    /// Of the owned degrees of freedom, here and below, with those that follow the motion.
+    /// Of the owned degrees of freedom, here and below, with those that follow the motion and those of declared
+    /// terms.
     pub external_start: Vec<f64>,
-    /// The forces that follow the motion are added once the step is solved.
+    /// Both of these are added once the step is solved.
     pub external_end: Vec<f64>,
 }
 
@@ -42,6 +44,13 @@ impl<const D: usize> Loads<D> {
             let mut owned = nodes_start.clone();
             mesh.numbering.halo.reverse_add(world, &mut owned, D)?;
             add(&mut external_start, 1.0, &owned);
+        }
+        let of = Context::new(world, model, (mesh, points), span);
+        let exerted = declaration::exerted(of, None)?;
+        if !exerted.is_empty() {
+            nodes_start.resize(mesh.numbering.len() * D, 0.0);
+            add(&mut nodes_start, 1.0, &exerted);
+            add(&mut external_start, 1.0, &exerted);
         }
         Ok(Loads {
             external_start,

@@ -19,8 +19,8 @@ use crate::system::terms::contact::ContactTerm;
 
 use super::free_bodies::{FreeBodies, gravity};
 
-/// r, of the forces, up to which the motion has settled.
-const SETTLED: f64 = 1e-6;
+/// r, of the forces, up to which the iteration over the forces has converged.
+const CONVERGED: f64 = 1e-6;
 /// Solves of a step.
 const ROUNDS: usize = 40;
 
@@ -135,9 +135,9 @@ impl<const D: usize> FreeMotion<D> {
     }
 
     /// After a solve with the nodal increments `displacement`, `shares` of the forces at both ends in
-    /// those of the step: whether the motion has settled, or the next forces to try. Error: it does not
-    /// settle. Collective.
-    pub fn settle(
+    /// those of the step: whether the forces have converged; if not, the next ones are set. Error: they do not
+    /// converge. Collective.
+    pub fn correct(
         &mut self,
         world: &World,
         contact: &ContactTerm<D>,
@@ -153,7 +153,7 @@ impl<const D: usize> FreeMotion<D> {
             .map(|one| one.body.mass * one.gravity.iter().map(|g| g * g).sum::<f64>().sqrt())
             .sum();
         let size = self.found.norm().max(self.force.norm()).max(weight);
-        if rest.norm() <= SETTLED * size {
+        if rest.norm() <= CONVERGED * size {
             return Ok(true);
         }
         if self.rounds == ROUNDS {

@@ -17,6 +17,7 @@ use crate::system::numbering::Numbering;
 use crate::system::step_system::{Coupling, Discretisation};
 use crate::system::terms::Term;
 use crate::system::terms::contact::ContactTerm;
+use crate::system::terms::declaration::{self, Context};
 use crate::system::terms::facing::FacingTerm;
 use crate::system::terms::following::Following;
 use crate::system::terms::surface::Borne;
@@ -163,7 +164,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
                 terms.push(term);
             }
             let system = clock.time(Phase::Assemble, || {
-                let step = mesh.step_points(points, &model.materials);
+                let of = Context::new(world, model, (&mesh, points), span);
                 let kind = (model.deck.method.frame, model.symmetric());
                 let following = Following::new(model, &mesh, points, span.end());
                 let equations = StepEquations {
@@ -171,7 +172,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
                     conditions,
                     left_out,
                     external_owned: driving.clone(),
-                    terms: motion::terms(world, &mesh, step, kind, terms)?,
+                    terms: motion::terms(of, kind, terms)?,
                     following: following.map(|loads| (Box::new(loads) as _, share)),
                 };
                 newton::System::new(world, model, &mesh, equations)
@@ -183,7 +184,7 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
             let (Some(moving), Some(contact)) = (&mut moving, &contact) else {
                 break (driving, solved);
             };
-            match moving.settle(run.world, contact, &solved.displacement, shares) {
+            match moving.correct(run.world, contact, &solved.displacement, shares) {
                 Ok(true) => break (driving, solved),
                 Ok(false) => {}
                 Err(what) => return Err(Refusal { cause: Cause::NotConverged, what }.into()),
@@ -195,6 +196,8 @@ impl<const D: usize> Analysis<D> for Implicit<D> {
 
         let borne = supports_in_step(run, &mesh, span, &displacement, inertial.as_ref());
         let Run { world, model, points, clock, .. } = &mut *run;
+        let of = Context::new(world, model, (&mesh, points), span);
+        add(&mut loads.external_end, 1.0, &declaration::exerted(of, Some(&displacement))?);
         if let Some(contact) = &contact
             && let Some(what) = world.first_message(contact.too_deep(points, &displacement))
         {

@@ -74,9 +74,11 @@ pub(crate) fn warning<const D: usize>(
     )))
 }
 
-/// Whether the start can be in balance: supports by penalty and contacts bear nothing before they have given way.
+/// Whether the start can be in balance: supports by penalty, contacts and declared terms bear
+/// nothing before they have given way.
 fn judged(deck: &Deck) -> bool {
     deck.bodies.iter().any(|body| body.initial_stress.is_some() && body.presence.holds_in(0))
         && deck.boundaries.iter().all(|boundary| boundary.support().is_none())
         && deck.contacts.is_empty()
+        && deck.terms.is_empty()
 }

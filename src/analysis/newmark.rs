@@ -3,7 +3,7 @@
 
 use crate::deck::model::Analysis;
 use crate::points::Points;
-use crate::system::terms::stress::StepPoints;
+use crate::system::step_points::StepPoints;
 
 use crate::transfer::mapping;
 

@@ -20,6 +20,7 @@ use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
 use crate::transfer::mesh_motion;
 use crate::transfer::refusal::{Cause, Halt, Refusal};
+use crate::transfer::soundness;
 use crate::transfer::update::{self, Increments};
 
 /// A converged step. Vectors hold the owned degrees of freedom unless said otherwise.
@@ -193,9 +194,17 @@ pub(crate) fn carried<const D: usize>(
     let moved_grid = mesh_motion::moved(world, deck, grid, numbering, displacement, span)?;
     let after = moved_grid.as_ref().unwrap_or(grid);
     let basis = deck.method.basis;
-    update::require_sound(world, after, &deck.boundaries, points, &made)?;
+    soundness::require_sound(world, after, &deck.boundaries, points, &made)?;
     let grids = [grid, after];
-    update::require_sound_domains(world, grids, basis, numbering, displacement, points, &mut made)?;
+    soundness::require_sound_domains(
+        world,
+        grids,
+        basis,
+        numbering,
+        displacement,
+        points,
+        &mut made,
+    )?;
     Ok(Carried { made, moved_grid })
 }
 

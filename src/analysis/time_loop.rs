@@ -21,7 +21,7 @@ use crate::record::step::{Moment, Solved};
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::transfer::refusal::Halt;
-use crate::transfer::update;
+use crate::transfer::soundness;
 
 use super::failure::Failure;
 use super::stage_changes;
@@ -154,7 +154,7 @@ fn halted<const D: usize>(
         }
         halt => halt,
     };
-    let point = run.world.first_message(update::not_finite(&run.points));
+    let point = run.world.first_message(soundness::not_finite(&run.points));
     let undone = analysis.undo(&mut run.points);
     let halt = match halt {
         Halt::Failed(error) if !undone => return Err(error),

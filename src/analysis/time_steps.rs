@@ -5,7 +5,7 @@
 //! 4 c^2 / h^2 with the lumped one, c the speed of pressure waves. Cut cells of a stabilised
 //! body come close to that (Ghost Figure 7); those of an unstabilised one do not matter, since
 //! the method starts each step from the points. A point may also not cross a cell in one step.
-//! The penalty of a contact adds to the stiffness of the outermost cells.
+//! The penalty of a contact adds to the stiffness of the outermost cells, a declared term to that of its points.
 //! `type = "conditioning"` gives the limit of the true eigenvalues for any position.
 
 use crate::deck::model::Mass;
@@ -21,6 +21,7 @@ use crate::surface::norm;
 use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::supports::Support;
+use crate::system::terms::Declared;
 use crate::transfer::update;
 
 /// Where a run stands in time.
@@ -140,7 +141,11 @@ pub fn stability_limit<const D: usize>(
             0.0 => 0.0,
             stiffness => stiffness * points.volume(p) / points.mass[p],
         };
-        let held = 0.25 * h * h * held_frequency(model, points, p) + spring;
+        let stiffest = |term: &Declared| {
+            term.stiffness(points, p).into_iter().fold(0.0, f64::max) / points.mass[p]
+        };
+        let squared: f64 = model.deck.terms.iter().map(stiffest).sum();
+        let held = 0.25 * h * h * (held_frequency(model, points, p) + squared) + spring;
         rate = rate.max((wave.abs() + held).sqrt() * factor + speed);
         wave_energy += points.mass[p] * wave.abs();
     }

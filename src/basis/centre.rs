@@ -16,7 +16,7 @@
 use super::cell_parts::CellPart;
 use super::hats::spans;
 use super::product::for_each_index;
-use super::radial::{Piece, pieces_of_rings};
+use super::radial::{AxisPart, axis_parts_of_rings};
 use super::{Groups, Influences, lattice_of};
 use crate::error::Result;
 use crate::grid::{Grid, Lattice};
@@ -86,13 +86,13 @@ pub(super) fn means<const D: usize, const N: usize>(
 }
 
 /// The parts of point `p`'s domain along each axis, and the first cell of each.
-fn pieces<const D: usize>(
+fn axis_parts<const D: usize>(
     grid: &Grid<D>,
     lattice: &Lattice<D>,
     points: &Points<D>,
     p: usize,
     rings: bool,
-    out: &mut [Vec<Piece>; D],
+    out: &mut [Vec<AxisPart>; D],
 ) -> Result<()> {
     let spans = spans(grid, lattice, points, p)?;
     let (x, half) = (&points.position[p], &points.half_length[p]);
@@ -101,7 +101,7 @@ fn pieces<const D: usize>(
         let span = spans[axis];
         if rings && axis == 0 {
             let ends = [(x[0] - half[0]).max(0.0), x[0] + half[0]];
-            pieces_of_rings(lattice, span.first, span.last - span.first + 1, ends, line);
+            axis_parts_of_rings(lattice, span.first, span.last - span.first + 1, ends, line);
             continue;
         }
         let reach = half[axis] / lattice.spacing[axis];
@@ -111,7 +111,7 @@ fn pieces<const D: usize>(
             let start = if cell == 0 { low } else { cell as f64 };
             let end = if cell == last { high } else { (cell + 1) as f64 };
             let (share, place) = ((end - start) / (high - low), 0.5 * (start + end) - cell as f64);
-            line.push(Piece { share, place, plain: [0.0; 2] });
+            line.push(AxisPart { share, place, plain: [0.0; 2] });
         }
     }
     Ok(())
@@ -126,9 +126,9 @@ pub(super) fn moments_of_domains<const D: usize>(
 ) -> Result<Vec<Moments>> {
     let lattice = lattice_of(grid)?;
     let mut sums = vec![Moments::default(); rows.count];
-    let mut parts: [Vec<Piece>; D] = std::array::from_fn(|_| Vec::new());
+    let mut parts: [Vec<AxisPart>; D] = std::array::from_fn(|_| Vec::new());
     for p in 0..points.len() {
-        pieces(grid, lattice, points, p, rings, &mut parts)?;
+        axis_parts(grid, lattice, points, p, rings, &mut parts)?;
         let (nodes, volume) = (rows.of(p), points.volume(p));
         let counts = parts.each_ref().map(|line| line.len());
         for_each_index(&counts, |index| {
@@ -136,12 +136,12 @@ pub(super) fn moments_of_domains<const D: usize>(
             for mask in 0..1 << D {
                 let (mut moment, mut inverse) = (volume, volume);
                 for axis in 0..D {
-                    let piece = &parts[axis][index[axis]];
+                    let part = &parts[axis][index[axis]];
                     let bit = mask >> axis & 1 == 1;
-                    let own = piece.share * if bit { piece.place } else { 1.0 };
+                    let own = part.share * if bit { part.place } else { 1.0 };
                     moment *= own;
                     inverse *= match axis {
-                        0 => piece.plain[0] * if bit { piece.plain[1] } else { 1.0 },
+                        0 => part.plain[0] * if bit { part.plain[1] } else { 1.0 },
                         _ => own,
                     };
                 }
@@ -167,10 +167,10 @@ pub(super) fn fill_from_domains<const D: usize>(
     let rings = !influences.hoop.is_empty();
     influences.centre_gradients = vec![[0.0; D]; influences.nodes.len()];
     influences.centre_hoop = vec![0.0; influences.hoop.len()];
-    let mut parts: [Vec<Piece>; D] = std::array::from_fn(|_| Vec::new());
+    let mut parts: [Vec<AxisPart>; D] = std::array::from_fn(|_| Vec::new());
     let mut of_point = Vec::new();
     for p in 0..points.len() {
-        pieces(grid, lattice, points, p, rings, &mut parts)?;
+        axis_parts(grid, lattice, points, p, rings, &mut parts)?;
         let (nodes, start) = (rows.of(p), influences.row(p).start);
         let counts = parts.each_ref().map(|line| line.len());
         of_point.clear();

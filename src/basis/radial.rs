@@ -27,7 +27,7 @@ use crate::points::Points;
 
 /// A domain's part in a cell, along one axis.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Piece {
+pub(super) struct AxisPart {
     /// Of the domain, of rings by volume
     pub share: f64,
     /// Mean place in the cell, so weighted
@@ -128,7 +128,7 @@ struct Radial {
     slopes: Vec<f64>,
     /// ∫ N dr / (r_c L), 1/m
     hoop: Vec<f64>,
-    pieces: Vec<Piece>,
+    axis_parts: Vec<AxisPart>,
 }
 
 impl Radial {
@@ -146,10 +146,10 @@ impl Radial {
             values.resize(cells + 1, 0.0);
         }
         let spacing = lattice.spacing[0];
-        self.pieces.clear();
-        pieces_of_rings(lattice, first, cells, ends, &mut self.pieces);
-        for (cell, piece) in self.pieces.iter().enumerate() {
-            let (share, centre, [plain, at]) = (piece.share, piece.place, piece.plain);
+        self.axis_parts.clear();
+        axis_parts_of_rings(lattice, first, cells, ends, &mut self.axis_parts);
+        for (cell, part) in self.axis_parts.iter().enumerate() {
+            let (share, centre, [plain, at]) = (part.share, part.place, part.plain);
             for (node, n, n_plain, sign) in
                 [(cell, 1.0 - centre, 1.0 - at, -1.0), (cell + 1, centre, at, 1.0)]
             {
@@ -162,12 +162,12 @@ impl Radial {
 }
 
 /// The parts of a ring's domain along the radius ([`super::centre`]); arguments as in [`Radial::fill`].
-pub(super) fn pieces_of_rings<const D: usize>(
+pub(super) fn axis_parts_of_rings<const D: usize>(
     lattice: &Lattice<D>,
     first: usize,
     cells: usize,
     [low, high]: [f64; 2],
-    out: &mut Vec<Piece>,
+    out: &mut Vec<AxisPart>,
 ) {
     let spacing = lattice.spacing[0];
     let line = |node: usize| lattice.origin[0] + (first + node) as f64 * spacing;
@@ -179,7 +179,7 @@ pub(super) fn pieces_of_rings<const D: usize>(
         let plain = length_here / length;
         let at = (radius - line(cell)) / spacing;
         let place = at + length_here * length_here / (12.0 * radius * spacing);
-        out.push(Piece { share: plain * radius / middle, place, plain: [plain / middle, at] });
+        out.push(AxisPart { share: plain * radius / middle, place, plain: [plain / middle, at] });
     }
 }
 

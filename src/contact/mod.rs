@@ -27,7 +27,7 @@
 //! | the rigid bodies and contacts of a deck | [`Contacts`] | `contacts.rs` |
 //!
 //! A new surface is one file that implements [`Surface`](surface::Surface) and one line of `contacts.rs`. The forces
-//! and their tangent are a term of the equations: `system/terms/contact.rs`.
+//! and their tangent are a term of the equations: `system/terms/contact/mod.rs`.
 
 pub(crate) mod ball;
 pub(crate) mod capsule;

@@ -6,6 +6,7 @@ use super::model::Basis;
 use super::schema;
 use super::templates::TEMPLATES;
 use crate::material::{CATALOGUE, state_variables};
+use crate::system::terms::KEYS;
 
 /// A line on each analysis; a test holds it to the deck's words.
 const ANALYSES: [(&str, &str); 6] = [
@@ -17,7 +18,7 @@ const ANALYSES: [(&str, &str); 6] = [
     ("element-test", "one point under a laboratory path, without grid"),
 ];
 
-/// Materials, bases, analyses, loads, fields and templates.
+/// Materials, bases, analyses, loads, terms, fields and templates.
 pub fn list() -> String {
     let mut out = String::new();
     let mut part = |title: &str, rows: Vec<(String, String)>| {
@@ -46,6 +47,9 @@ pub fn list() -> String {
         .map(|key| (key.name, first_sentence(key.doc)))
         .collect();
     part("loads ([[load]])", pairs(&loads));
+    let terms: Vec<(&str, &str)> =
+        KEYS.iter().map(|key| (key.name, first_sentence(key.doc))).collect();
+    part("further terms (a table of their own)", pairs(&terms));
     let mut fields: Vec<(String, String)> = FIELDS
         .iter()
         .map(|field| {

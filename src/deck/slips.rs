@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::problems::rough;
+use super::schema::{self, Kind};
 
 const UNITS: &str = "numbers carry no unit: lengths are in m, densities in kg/m3, stresses in Pa, so that \
                      10 MPa is 10e6";
@@ -75,11 +76,14 @@ fn of_header(line: &str) -> String {
     let name = line.trim_matches(['[', ']']);
     match name.split('.').next() {
         Some("material") => "each material has a name of its own: [material.NAME]".into(),
-        Some(
-            name @ ("body" | "boundary" | "load" | "rigid" | "contact" | "probe" | "verify"
-            | "stage"),
-        ) if !line.starts_with("[[") => {
-            format!("write [[{name}]], in double brackets, once for each of them")
+        Some(name) if !line.starts_with("[[") => {
+            let key = schema::section("").key(name);
+            match key.map(|key| key.kind) {
+                Some(Kind::Tables(_)) => {
+                    format!("write [[{name}]], in double brackets, once for each of them")
+                }
+                _ => String::new(),
+            }
         }
         _ => String::new(),
     }

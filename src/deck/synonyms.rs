@@ -90,7 +90,7 @@ const TIMES: [&str; 12] = [
 /// What is known of another program's name in a table.
 pub enum Meant {
     /// The cure.
-    Told(&'static str),
+    Hint(&'static str),
     /// Too many meanings: any hint would mislead.
     Unsaid,
     /// Nothing beyond the names of [`key`].
@@ -138,7 +138,7 @@ pub fn meant(section: &str, name: &str, read: &[&str], timeless: bool) -> Meant 
         (_, _) if name == "type" && !reads("model") => return Meant::Unsaid,
         _ => return Meant::Otherwise,
     };
-    Meant::Told(told)
+    Meant::Hint(told)
 }
 
 /// The one of `known` that is meant by another program's name of a key.

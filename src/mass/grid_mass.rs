@@ -10,9 +10,9 @@ use crate::grid::Grid;
 use crate::parallel::World;
 use crate::system::scatter::BlockMatrix;
 
+use crate::system::step_points::StepPoints;
 use crate::system::step_system::Discretisation;
 use crate::system::terms::ghost::ghost_matrix;
-use crate::system::terms::stress::StepPoints;
 use crate::transfer::nodal_sums::over_points;
 
 /// Mass of the active nodes of one step.

@@ -16,8 +16,8 @@ use std::ops::Range;
 
 use crate::error::Result;
 use crate::parallel::World;
+use crate::system::step_points::StepPoints;
 use crate::system::step_system::Discretisation;
-use crate::system::terms::stress::StepPoints;
 use crate::transfer::nodal_sums::over_points;
 
 use super::grid_mass::GridMass;

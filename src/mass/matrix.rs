@@ -15,7 +15,7 @@ use crate::parallel::World;
 use crate::parallel::HaloPlan;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::{BlockMatrix, add_support};
-use crate::system::terms::stress::StepPoints;
+use crate::system::step_points::StepPoints;
 
 /// Row sums at the local nodes; ghost shares are not yet sent to their owners. kg
 pub fn lumped<const D: usize>(step: StepPoints<'_, D>, nodes: usize) -> Vec<f64> {

@@ -48,7 +48,7 @@ pub fn wrong_floor<const D: usize>(deck: &Deck) -> Option<String> {
     let gravity = gravity::<D>(deck);
     let axis = (0..D).find(|&axis| gravity[axis] != 0.0)?;
     let alone = (0..D).all(|other| other == axis || gravity[other] == 0.0);
-    if D != 3 || axis == 1 || !alone || !deck.contacts.is_empty() {
+    if D != 3 || axis == 1 || !alone || !deck.contacts.is_empty() || !deck.terms.is_empty() {
         return None;
     }
     let upper = gravity[axis] > 0.0;
@@ -75,7 +75,7 @@ pub fn wrong_floor<const D: usize>(deck: &Deck) -> Option<String> {
 pub fn upward<const D: usize>(deck: &Deck) -> Option<String> {
     let gravity = gravity::<D>(deck);
     let axis = (0..D).find(|&axis| gravity[axis] != 0.0)?;
-    if gravity[axis] < 0.0 || !deck.contacts.is_empty() {
+    if gravity[axis] < 0.0 || !deck.contacts.is_empty() || !deck.terms.is_empty() {
         return None;
     }
     let mut bears = false;

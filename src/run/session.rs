@@ -42,7 +42,7 @@ use crate::record::verify;
 use crate::system::apart::require_apart;
 use crate::system::conditions::StepSpan;
 use crate::system::step_system;
-use crate::transfer::update;
+use crate::transfer::soundness;
 
 /// Runs the program with the words of its command line (the program's name first); returns the
 /// exit code, the same on all ranks.
@@ -360,7 +360,7 @@ impl Start<'_> {
                 _ if ending.on_request => Vec::new(),
                 3 => vec![checkpointing::advice(world, &run.recorder.directory())],
                 // What is missing there is said already, and no step is small enough.
-                _ if !of_numerics || ending.reason.contains(update::NOT_HELD) => Vec::new(),
+                _ if !of_numerics || ending.reason.contains(soundness::NOT_HELD) => Vec::new(),
                 _ => advice(&run.model.deck),
             },
             ..Failure::default()

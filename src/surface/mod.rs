@@ -4,7 +4,7 @@
 //! | file | idea |
 //! |---|---|
 //! | `mod.rs` | an element, and the surface that a part of a run acts on |
-//! | `piece.rs` | smooth pieces of the surfaces of forms |
+//! | `patch.rs` | smooth patches of the surfaces of forms |
 //! | `of_shape.rs` | which of them lie on the surface of a shape, cut into elements |
 //! | `sheet.rs` | lines and planes through the bodies |
 //! | `carriers.rs` | the point that carries each element |
@@ -18,7 +18,7 @@
 
 pub(crate) mod carriers;
 pub(crate) mod of_shape;
-mod piece;
+mod patch;
 pub(crate) mod sheet;
 
 use std::ops::Range;

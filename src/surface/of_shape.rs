@@ -1,7 +1,7 @@
-//! The surface of a shape: pieces of its forms where the shape lies on one side only, cut into elements
+//! The surface of a shape: patches of its forms where the shape lies on one side only, cut into elements
 //! of about half the spacing of the points.
 
-use super::piece::{self, Piece};
+use super::patch::{self, Patch};
 use super::{Element, norm};
 use crate::deck::Scope;
 use crate::deck::expression::Expression;
@@ -49,8 +49,8 @@ pub fn elements<const D: usize>(shape: &Shape, part: Part<'_>, spacing: f64) -> 
     let mut found = Vec::new();
     for index in 0..leaves.len() {
         let leaf = &leaves[index];
-        for piece in piece::of_form(leaf.form, D) {
-            cut(shape, &leaves[..index], leaf, &piece, part, spacing, &mut found);
+        for patch in patch::of_form(leaf.form, D) {
+            cut(shape, &leaves[..index], leaf, &patch, part, spacing, &mut found);
         }
     }
     found
@@ -90,18 +90,18 @@ impl Leaf<'_> {
     }
 }
 
-/// Cuts a piece into elements and keeps what lies on the surface of the whole shape.
+/// Cuts a patch into elements and keeps what lies on the surface of the whole shape.
 fn cut<const D: usize>(
     shape: &Shape,
     before: &[Leaf<'_>],
     leaf: &Leaf<'_>,
-    piece: &Piece,
+    patch: &Patch,
     part: Part<'_>,
     spacing: f64,
     found: &mut Vec<Element<D>>,
 ) {
     let single = before.is_empty() && std::ptr::eq(leaf.form, &shape.form);
-    let (extent, folds) = (piece.extent(), piece.folds());
+    let (extent, folds) = (patch.extent(), patch.folds());
     let counts: [usize; 2] = std::array::from_fn(|k| {
         if k + 1 >= D {
             return 1;
@@ -120,7 +120,7 @@ fn cut<const D: usize>(
             let at = |k: usize| {
                 (first[k] as f64 + (step[k] as f64 + 0.5) / looks[k] as f64) / counts[k] as f64
             };
-            let (x, a) = piece.at(at(0), at(1));
+            let (x, a) = patch.at(at(0), at(1));
             let (x, a) = (leaf.to_global(x), leaf.direction(a).map(|a| a * share));
             let length = norm(&a);
             if length == 0.0 {
@@ -147,11 +147,11 @@ fn cut<const D: usize>(
             continue;
         }
         // Of an element that is kept as a whole, its middle lies on the surface itself.
-        let whole = kept == looks[0] * looks[1] && !piece.is_flat();
+        let whole = kept == looks[0] * looks[1] && !patch.is_flat();
         let centre = match whole {
             true => {
                 let at = |k: usize| (first[k] as f64 + 0.5) / counts[k] as f64;
-                leaf.to_global(piece.at(at(0), at(1)).0)
+                leaf.to_global(patch.at(at(0), at(1)).0)
             }
             false => middle.map(|m| m / size),
         };

@@ -3,6 +3,15 @@
 
 use std::ops::Range;
 
+/// Which of both is asked for. What other ranks wait for comes first, and is on its way while the rest is summed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// What reaches nodes of other ranks.
+    Reaching,
+    /// The rest.
+    Inner,
+}
+
 /// Indices of either kind, each as ascending runs.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Border {
@@ -13,6 +22,14 @@ pub struct Border {
 }
 
 impl Border {
+    /// Indices of a part.
+    pub fn of(&self, part: Part) -> &[Range<usize>] {
+        match part {
+            Part::Reaching => &self.reaching,
+            Part::Inner => &self.inner,
+        }
+    }
+
     /// Index by index, whether it reaches values of other ranks.
     pub fn new(reaches: impl Iterator<Item = bool>) -> Self {
         let mut border = Border::default();

@@ -15,8 +15,8 @@
 use rustc_hash::FxHashMap;
 use std::f64::consts::TAU;
 
+use super::carried::{area_of, grid_weights, place_of};
 use super::model::Model;
-use super::terms::surface::{area_of, grid_weights, place_of};
 use crate::basis::Domain;
 use crate::basis::Influences;
 use crate::contact::law::Friction;

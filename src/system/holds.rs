@@ -5,9 +5,9 @@ use crate::deck::model::{Held, Symmetry};
 use crate::points::Points;
 use crate::surface::{Carried, Element};
 
+use super::carried::{area_of, place_of};
 use super::model::Model;
 use super::supports::Support;
-use super::terms::surface::{area_of, place_of};
 
 /// Names of the words of a body's points: of each support of a later stage that holds it, of each element that a
 /// point may carry, place (m) and area vector (m2).

@@ -7,11 +7,12 @@
 //! | `step_system.rs` | locate, map and number: the grid side of a step |
 //! | `populated.rs` | which cells hold material, and whose |
 //! | `rim.rs` | whose points lie in the cells at a lattice's edge |
+//! | `step_points.rs` | points with their functions, as the equations see them |
 //! | `numbering.rs` | equations over active nodes, contiguous by rank |
 //! | `node_index.rs` | grid nodes to small indices |
 //! | `graph.rs` | which nodes meet |
 //! | `pattern.rs` | exact sparsity, and where every contribution goes |
-//! | `places.rs` | where each dense block lies in the rows |
+//! | `support_columns.rs` | where each dense block lies in the rows |
 //! | `kernel.rs` | sums over points, tiled for vector registers |
 //! | `cell_rows.rs` | rows of cells that points share with F-bar, and their sums |
 //! | `plain.rs` | these sums once more, written as the formulas read |
@@ -21,6 +22,8 @@
 //! | `held.rs` | held degrees of freedom in those rows |
 //! | `conditions.rs` | Dirichlet conditions on the nodes |
 //! | `supports.rs` | surfaces held by a penalty, wherever they lie on the grid |
+//! | `holds.rs` | where a support of a later stage holds the elements that come with it |
+//! | `carried.rs` | where elements of surfaces are that points carry |
 //! | `face_points.rs` | the cells of points on faces, where the mass decides |
 //! | `apart.rs` | no body overlaps a rigid one that comes |
 //! | `facing.rs` | elements of surfaces that face another body |
@@ -30,6 +33,7 @@
 
 pub(crate) mod apart;
 pub mod border;
+pub(crate) mod carried;
 pub(crate) mod cell_rows;
 pub mod conditions;
 pub(crate) mod face_points;
@@ -48,6 +52,7 @@ pub(crate) mod populated;
 pub(crate) mod rim;
 pub mod scatter;
 pub mod shared_nodes;
+pub mod step_points;
 pub mod step_system;
 pub(crate) mod support_columns;
 pub(crate) mod supports;

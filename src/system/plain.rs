@@ -11,7 +11,8 @@ use crate::tensor::dense;
 use super::numbering::Numbering;
 use super::pattern::Pattern;
 use super::scatter::BlockMatrix;
-use super::terms::stress::{StepPoints, respond, respond_averaged, respond_ring};
+use super::step_points::StepPoints;
+use super::terms::point_response::{respond, respond_averaged, respond_ring};
 use super::terms::term::Health;
 
 /// As [`crate::system::terms::stress::assemble`], to rounding.

@@ -1,6 +1,7 @@
 //! The grid side of a step: influences, populated cells, Ghost faces, equations, sparsity.
 
 use super::border::Border;
+use super::carried;
 use super::conditions::{Conditions, StepSpan};
 use super::face_points;
 use super::facing::{self, Couple};
@@ -10,8 +11,7 @@ use super::numbering::Touched;
 use super::pattern::{self, Pattern};
 use super::populated::{GROUP, Populated};
 use super::rim::Rim;
-use super::terms::stress::StepPoints;
-use super::terms::surface;
+use super::step_points::StepPoints;
 use super::unknowns::Unknowns;
 use crate::basis::centre::{Moments, RowNodes};
 use crate::basis::contract::Basis;
@@ -237,7 +237,7 @@ impl<const D: usize> Discretisation<D> {
             facing,
             on_face: on_face.into_iter().map(|mark| mark > 0.0).collect(),
             ghost_cells,
-            carriers: surface::carriers(model, points),
+            carriers: carried::carriers(model, points),
             point_volume: model.deck.method.point_volume,
         })
     }

@@ -45,7 +45,7 @@ use crate::deck::model::{AffineTransfer, Method};
 use crate::error::Result;
 use crate::grid::Grid;
 use crate::points::Points;
-use crate::system::terms::stress::StepPoints;
+use crate::system::step_points::StepPoints;
 use crate::tensor::Square;
 
 /// What points take from the grid beside their velocity.

@@ -10,7 +10,7 @@ use crate::mechanics::{Increment, dilation};
 use crate::points::Points;
 use crate::system::cell_rows::rows_now;
 use crate::system::numbering::Numbering;
-use crate::system::terms::stress::StepPoints;
+use crate::system::step_points::StepPoints;
 use crate::tensor::Square;
 use crate::tensor::dense;
 

@@ -3,8 +3,8 @@
 
 #[path = "../common/mod.rs"]
 mod common;
-mod foundation;
 mod spline;
+mod springs;
 mod swift;
 mod wind;
 
@@ -29,12 +29,12 @@ use mpm_par::parallel::World;
 use mpm_par::petsc::Session;
 use mpm_par::points::{self, Points};
 use mpm_par::run::setup;
-use mpm_par::system::conditions::Conditions;
+use mpm_par::system::conditions::{Conditions, StepSpan};
 use mpm_par::system::model::Model;
 use mpm_par::system::step_system::{Coupling, Discretisation};
+use mpm_par::system::terms::declaration::Context;
 use mpm_par::system::unknowns::Unknowns;
 
-use foundation::Foundation;
 use spline::Spline;
 use swift::Swift;
 use wind::Wind;
@@ -42,18 +42,17 @@ use wind::Wind;
 #[test]
 fn pages_show_the_files() {
     for (page, file) in [
-        ("adding-a-material.md", "swift.rs"),
-        ("adding-a-term.md", "foundation.rs"),
-        ("adding-a-load.md", "wind.rs"),
-        ("adding-a-basis.md", "spline.rs"),
+        ("adding-a-material.md", "tests/adding/swift.rs"),
+        ("adding-a-term.md", "src/system/terms/foundation.rs"),
+        ("adding-a-load.md", "tests/adding/wind.rs"),
+        ("adding-a-basis.md", "tests/adding/spline.rs"),
     ] {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let read = |path: &str| std::fs::read_to_string(root.join(path)).expect(path);
-        let (page_text, code) =
-            (read(&format!("docs/develop/{page}")), read(&format!("tests/adding/{file}")));
+        let (page_text, code) = (read(&format!("docs/develop/{page}")), read(file));
         assert!(
             page_text.contains(&format!("```rust\n{code}```\n")),
-            "docs/develop/{page} does not show tests/adding/{file} word for word"
+            "docs/develop/{page} does not show {file} word for word"
         );
     }
 }
@@ -123,21 +122,21 @@ where = { box = { min = [0, -1], max = [2, 4] } }
 fix = ["x"]
 [[load]]
 gravity = [0, -10]
+[[foundation]]
+axis = "y"
+stiffness = "2e6 / 0.25 * (Y < 0.25)"
 "#;
+
+/// Of the layer of points on springs: a stiffness per volume times its thickness, N/m3.
+const SUBGRADE: f64 = 2e6;
 
 fn block(world: &World) -> (Model<2>, Points<2>) {
     let deck = deck::read(Path::new("block.toml"), BLOCK, &[]).expect("a sound deck");
     setup::prepare(world, deck).expect("a sound problem")
 }
 
-/// Lengths of the left side and of the bottom, m.
-const LENGTHS: [f64; 2] = [3.0, 2.0];
-
-/// Initial volume of the points at the left side or the bottom, over all ranks, m2.
-fn volume_at(world: &World, axis: usize, points: &Points<2>) -> f64 {
-    let carried = (0..points.len()).filter(|&p| wind::carries(axis, 0.0, points, p));
-    world.sum(carried.map(|p| points.volume_initial[p]).sum())
-}
+/// Length of the left side, m.
+const HEIGHT: f64 = 3.0;
 
 /// The block sinks until its springs hold its weight: by rho g H / k_s at the layer of springs,
 /// whatever its stiffness.
@@ -169,22 +168,15 @@ fn rest_on_springs(world: &World, basis: &dyn Basis<2>) {
     numbering.halo.reverse_add(world, &mut external, 2).expect("sums");
     external.truncate(numbering.owned * 2);
 
-    const SUBGRADE: f64 = 2e6;
-    let volume = volume_at(world, 1, &points);
-    let springs: Vec<f64> = (0..points.len())
-        .map(|p| match wind::carries(1, 0.0, &points, p) {
-            true => SUBGRADE * LENGTHS[1] * points.volume_initial[p] / volume,
-            false => 0.0,
-        })
-        .collect();
-    let foundation = Foundation::new(world, &mesh, step, 1, &springs).expect("springs");
     let kind = (Frame::Previous, true);
+    let span = StepSpan::first_of(&model.deck.stages, 0);
+    let of = Context::new(world, &model, (&mesh, &points), span);
     let equations = StepEquations {
         unknowns: Unknowns::displacements(),
         conditions: &conditions,
         left_out: &vec![false; numbering.len()],
         external_owned: external,
-        terms: motion::terms(world, &mesh, step, kind, vec![Box::new(foundation)]).expect("terms"),
+        terms: motion::terms(of, kind, Vec::new()).expect("terms"),
         following: None,
     };
     let system = System::new(world, &model, &mesh, equations).expect("equations");
@@ -193,7 +185,7 @@ fn rest_on_springs(world: &World, basis: &dyn Basis<2>) {
     assert!(solved.evaluations <= 6, "{:?}", attempt.errors);
     let u = &solved.displacement;
     let wanted = -2000.0 * 10.0 * 3.0 / SUBGRADE;
-    for p in (0..points.len()).filter(|&p| springs[p] > 0.0) {
+    for p in (0..points.len()).filter(|&p| points.position_initial[p][1] < 0.25) {
         let shares = &step.influences.weights[step.influences.row(p)];
         let moved: f64 = step
             .nodes_of(p)
@@ -308,7 +300,7 @@ fn blow(universe: &Universe) {
     let (model, points) = block(&world);
     let wind = Wind {
         side: 0.0,
-        area: LENGTHS[0],
+        area: HEIGHT,
         density: 1.25,
         speed: Expression::parse("25").expect("valid"),
         exponent: 0.5,

@@ -2,26 +2,25 @@
 
 use crate::deck::model::Frame;
 use crate::error::Result;
-use crate::parallel::World;
-use crate::system::step_system::Discretisation;
 use crate::system::terms::Term;
+use crate::system::terms::declaration::{self, Context};
 use crate::system::terms::ghost::Ghost;
-use crate::system::terms::stress::{StepPoints, Stress};
+use crate::system::terms::stress::Stress;
 
-/// Stress and Ghost stiffness, and the `further` terms of the step after them. `frame`: the configuration that
-/// stresses and gradients refer to; `symmetric`: the tangent of the stress equals its transposed. Collective.
+/// Stress and Ghost stiffness, the terms that tables of the deck switch on, and the `further` terms of the step after
+/// them. `frame`: the configuration that stresses and gradients refer to; `symmetric`: the tangent of the stress
+/// equals its transposed. Collective.
 pub fn terms<'a, const D: usize>(
-    world: &World,
-    mesh: &'a Discretisation<D>,
-    step: StepPoints<'a, D>,
+    of: Context<'a, D>,
     (frame, symmetric): (Frame, bool),
     mut further: Vec<Box<dyn Term<D> + 'a>>,
 ) -> Result<Vec<Box<dyn Term<D> + 'a>>> {
-    // A new term is a line here.
-    let mut terms: Vec<Box<dyn Term<D> + 'a>> = vec![Box::new(Stress { step, frame, symmetric })];
-    if let Some(ghost) = Ghost::new(world, mesh)? {
+    let stress = Stress { step: of.step, frame, symmetric };
+    let mut terms: Vec<Box<dyn Term<D> + 'a>> = vec![Box::new(stress)];
+    if let Some(ghost) = Ghost::new(of.world, of.mesh)? {
         terms.push(Box::new(ghost));
     }
+    terms.extend(declaration::of_deck(of)?);
     terms.append(&mut further);
     Ok(terms)
 }

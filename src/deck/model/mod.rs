@@ -59,6 +59,8 @@ pub struct Deck {
     pub loads: Vec<Load>,
     /// When each load acts, in their order.
     pub load_presence: Vec<Presence>,
+    /// Terms that tables of their own switch on: `[[foundation]]`.
+    pub terms: Vec<crate::system::terms::Declared>,
     pub rigids: Vec<Rigid>,
     pub contacts: Vec<Contact>,
     pub verify: Vec<Verify>,

@@ -22,7 +22,7 @@ impl Table<'_> {
         let known = self.section.keys.iter().map(|key| key.name);
         let read: Vec<&str> = known.filter(|key| self.may_read(key)).collect();
         match synonyms::meant(self.section.name, name, &read, self.is_static()) {
-            Meant::Told(text) => return Some(text.to_string()),
+            Meant::Hint(text) => return Some(text.to_string()),
             Meant::Unsaid => return None,
             Meant::Otherwise => {}
         }

@@ -1,7 +1,7 @@
-//! Boundaries, water and loads.
+//! Boundaries, water, loads and declared terms.
 
 use crate::deck::model::{Boundary, Deck, Held, Place, Support};
-use crate::deck::schema::{AXES, SIDES};
+use crate::deck::schema::{self, AXES, Kind, SIDES};
 
 use super::problem::presence;
 use super::toml_text::{array, axes, body_surface, expression, inline, number, quote, vector};
@@ -46,6 +46,17 @@ pub(super) fn conditions(w: &mut Writer<'_>, deck: &Deck) {
         w.table("[[load]]");
         w.line("load", key, value);
         presence(w, "load", when, Some(0));
+    }
+    for term in &deck.terms {
+        let key = term.key();
+        let section = match key.kind {
+            Kind::Table(section) | Kind::Tables(section) => section,
+            _ => key.name,
+        };
+        w.table(schema::section(section).header);
+        for (key, value) in term.written(&deck.bodies) {
+            w.line(section, key, value);
+        }
     }
 }
 

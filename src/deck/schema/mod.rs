@@ -3,11 +3,13 @@
 //! | file | idea |
 //! |---|---|
 //! | `mod.rs` | what a key is |
-//! | `problem.rs` | keys of the analysis: analysis, method, ghost, grid, outputs |
+//! | `top.rs` | keys of the top level, with those of terms from what they declare |
+//! | `problem.rs` | keys of the analysis: analysis, stage, method, ghost, grid |
 //! | `materials.rs` | keys of materials, from what the models declare |
 //! | `bodies.rs` | keys of what is analysed: bodies, shapes, boundaries, water |
 //! | `loads.rs` | keys of loads, from what they declare |
 //! | `contact.rs` | keys of rigid bodies and contact |
+//! | `results.rs` | keys of what is written and watched: verify, probe, output, parallel |
 //!
 //! Known keys, type and range checks, defaults, the resolved deck and `docs/guide/deck.md` all come
 //! from here.
@@ -17,6 +19,10 @@ mod contact;
 mod loads;
 pub(crate) mod materials;
 mod problem;
+mod results;
+mod top;
+
+use crate::system::terms;
 
 pub use crate::material::parameter::{ANY, POSITIVE, Range, at_least, between, inside};
 pub use bodies::{BOX_KEYS, SIDES};
@@ -137,12 +143,13 @@ pub struct Reader {
     pub values: &'static [&'static str],
 }
 
-const fn only(choice: &'static str, values: &'static [&'static str]) -> Reader {
+/// The choices of `choice` that read a key.
+pub const fn only(choice: &'static str, values: &'static [&'static str]) -> Reader {
     Reader { choice, values }
 }
 
 /// Analyses that solve equilibrium by iterations.
-const IMPLICIT: Reader =
+pub const IMPLICIT: Reader =
     only("analysis.type", &["quasi-static", "strength-reduction", "implicit-dynamic"]);
 const QUASI_STATIC: Reader = only("analysis.type", &["quasi-static", "strength-reduction"]);
 const STRENGTH_REDUCTION: Reader = only("analysis.type", &["strength-reduction"]);
@@ -151,7 +158,7 @@ const IMPLICIT_DYNAMIC: Reader = only("analysis.type", &["implicit-dynamic"]);
 /// Analyses in which the bodies have inertia.
 const DYNAMIC: Reader = only("analysis.type", &["explicit", "implicit-dynamic"]);
 /// Analyses that move the bodies by forces.
-const LOADED: Reader =
+pub const LOADED: Reader =
     only("analysis.type", &["quasi-static", "strength-reduction", "explicit", "implicit-dynamic"]);
 /// Analyses with a stiffness matrix, and with a mass matrix: what Ghost stabilises.
 const STIFF: Reader = only(
@@ -194,7 +201,8 @@ impl Key {
         Key { range, ..self }
     }
 
-    const fn read_by(self, readers: &'static [Reader]) -> Self {
+    /// Read by these choices alone.
+    pub const fn read_by(self, readers: &'static [Reader]) -> Self {
         Key { readers, ..self }
     }
 }
@@ -216,7 +224,9 @@ pub struct Section {
 pub fn sections() -> impl Iterator<Item = &'static Section> {
     let problem = problem::SECTIONS.iter().chain(materials::sections());
     let analysed = bodies::SECTIONS.iter().chain(loads::sections()).chain(contact::SECTIONS);
-    problem.chain(analysed).chain(problem::RESULT_SECTIONS)
+    let terms = terms::SECTIONS.iter().copied().flatten();
+    let all = std::iter::once(top::section()).chain(problem).chain(analysed).chain(terms);
+    all.chain(results::SECTIONS)
 }
 
 /// The section of that name. Names are fixed in this module, so that it always exists.

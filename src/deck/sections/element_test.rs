@@ -55,6 +55,7 @@ pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
         boundaries: Vec::new(),
         loads: Vec::new(),
         load_presence: Vec::new(),
+        terms: Vec::new(),
         rigids: Vec::new(),
         contacts: Vec::new(),
         verify: Vec::new(),

@@ -46,6 +46,8 @@ use super::problems::{Got, Problems};
 use super::reader::Table;
 use super::schema;
 use super::tree::Node;
+use crate::loads::Around;
+use crate::system::terms;
 
 /// Reads the whole deck; goes on after a problem as long as what follows can be judged.
 pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
@@ -84,6 +86,8 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
     let names = root.names_of("body");
     let boundaries = conditions::boundaries(&root, &earlier, &names, bodies.as_deref().ok());
     let loads = conditions::loads(&root, &earlier, &names, bodies.as_deref().ok());
+    let around = Around { root: &root, dimension, names: &names, bodies: bodies.as_deref().ok() };
+    let terms = terms::Declared::read(&root, &around);
     let staging = contact::InStages { names: &stage_names, kind };
     let rigids = contact::rigids(&root, directory, dimension, boundaries.as_deref().ok(), &staging);
     let contacts = {
@@ -99,12 +103,12 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         });
         grid_problems?;
     }
-    if let (Ok(analysis), Ok(stages), Ok(boundaries), Ok(loads)) =
-        (&analysis, &stages, &boundaries, &loads)
+    if let (Ok(analysis), Ok(stages), Ok(boundaries), Ok(loads), Ok(terms)) =
+        (&analysis, &stages, &boundaries, &loads, &terms)
     {
         // What a rigid body holds is known once its corners are.
         if matches!(&contacts, Ok(contacts) if contacts.is_empty()) {
-            restraint::check(&root, analysis, stages, (boundaries, &loads.0), dimension)?;
+            restraint::check(&root, analysis, stages, (boundaries, &loads.0, terms), dimension)?;
         } else if let Ok(bodies) = &bodies {
             stages::keeps_what_touches(&root, analysis.kind, bodies, boundaries)?;
         }
@@ -144,6 +148,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         boundaries: boundaries?,
         loads,
         load_presence,
+        terms: terms?,
         rigids: rigids?,
         contacts: contacts?,
         verify: verify?,

@@ -6,13 +6,14 @@ use crate::deck::reader::Table;
 use crate::deck::schema::AXES;
 use crate::deck::stage::Stage;
 use crate::deck::tree::Origin;
+use crate::system::terms::Declared;
 
 /// Reports an axis along which nothing is prescribed in a stage of a quasi-static analysis.
 pub fn check(
     root: &Table<'_>,
     analysis: &Analysis,
     stages: &[Stage],
-    (boundaries, loads): (&[Boundary], &[Load]),
+    (boundaries, loads, terms): (&[Boundary], &[Load], &[Declared]),
     dimension: usize,
 ) -> Got<()> {
     if !analysis.kind.is_static() {
@@ -21,7 +22,8 @@ pub fn check(
     let held = |axis: usize, stage: usize| {
         // Rings resist what would stretch their hoops.
         let hoops = axis == 0 && analysis.symmetry == Symmetry::Axisymmetric;
-        let floats = loads.iter().any(|load| load.may_hold(axis));
+        let floats = loads.iter().any(|load| load.may_hold(axis))
+            || terms.iter().any(|term| term.may_hold(axis));
         let holds =
             |boundary: &Boundary| boundary.presence.holds_in(stage) && boundary.may_hold(axis);
         hoops || floats || boundaries.iter().any(holds)

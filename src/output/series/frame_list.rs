@@ -35,7 +35,7 @@ pub struct FrameList {
     data: &'static str,
     file: GrowingFile,
     /// Step and text of each frame; on rank 0 only.
-    pieces: Vec<(usize, String)>,
+    entries: Vec<(usize, String)>,
     /// The file holds later ones.
     longer: bool,
 }
@@ -53,7 +53,7 @@ impl FrameList {
         };
         let (head, tail) = ends(format);
         let file = GrowingFile::new(&directory.file(&format!("{name}.{ending}")), head, tail);
-        FrameList { format, name, data, file, pieces: Vec::new(), longer: false }
+        FrameList { format, name, data, file, entries: Vec::new(), longer: false }
     }
 
     /// Continues the list of an earlier run, up to and including `last_step`; one that is not there begins
@@ -73,9 +73,9 @@ impl FrameList {
                     _ => text.lines().filter_map(|line| numbered(self.name, line)).collect(),
                 };
                 let before = all.len();
-                self.pieces = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
-                self.longer = self.pieces.len() < before;
-                self.file.assume(texts(&self.pieces));
+                self.entries = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
+                self.longer = self.entries.len() < before;
+                self.file.assume(texts(&self.entries));
             } else if self.format == Format::Xdmf && has_frames(path, self.data, last_step)? {
                 log.say(&format!(
                     "warning: {} is not there: the series begins anew after step {last_step}, and \
@@ -91,7 +91,7 @@ impl FrameList {
     pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
         on_root(comm, || {
             if std::mem::take(&mut self.longer) {
-                self.file.replace(texts(&self.pieces))?;
+                self.file.replace(texts(&self.entries))?;
             }
             Ok(())
         })
@@ -106,15 +106,15 @@ impl FrameList {
         comm: &SimpleCommunicator,
     ) -> Result<()> {
         on_root(comm, || {
-            let piece = match self.format {
+            let entry = match self.format {
                 Format::Xdmf => {
                     let data = format!("{}-{step:06}.h5", self.data);
-                    xdmf::piece((step, time), frame, totals, &data)
+                    xdmf::entry((step, time), frame, totals, &data)
                 }
-                format => line(format, self.name, (step, time), self.pieces.is_empty()),
+                format => line(format, self.name, (step, time), self.entries.is_empty()),
             };
-            self.pieces.push((step, piece));
-            self.file.push(texts(&self.pieces))
+            self.entries.push((step, entry));
+            self.file.push(texts(&self.entries))
         })
     }
 }
@@ -141,8 +141,8 @@ fn line(format: Format, name: &str, (step, time): StepTime, first: bool) -> Stri
     }
 }
 
-fn texts(pieces: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
-    pieces.iter().map(|(_, text)| text.as_str())
+fn texts(entries: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
+    entries.iter().map(|(_, text)| text.as_str())
 }
 
 /// The step that a line names, and the line.
@@ -176,11 +176,11 @@ mod tests {
         for format in [Format::Vtu, Format::VtkHdf] {
             let (head, tail) = ends(format);
             let steps = [0, 5, 1_000_000];
-            let pieces: Vec<String> =
+            let entries: Vec<String> =
                 steps.map(|s| line(format, "points", (s, 0.1 * s as f64), s == 0)).to_vec();
-            let text = format!("{head}{}{tail}", pieces.concat());
+            let text = format!("{head}{}{tail}", entries.concat());
             let found: Vec<_> = text.lines().filter_map(|line| numbered("points", line)).collect();
-            assert_eq!(found, steps.into_iter().zip(pieces).collect::<Vec<_>>());
+            assert_eq!(found, steps.into_iter().zip(entries).collect::<Vec<_>>());
             if format == Format::VtkHdf {
                 let list: serde_json::Value = serde_json::from_str(&text).unwrap();
                 assert_eq!(list["files"][1]["name"], "points-000005.h5");

@@ -1,7 +1,7 @@
-//! A file of pieces between a fixed head and a fixed tail that grows by one piece at a time and is
-//! whole at every moment, for what each piece costs.
+//! A file of entries between a fixed head and a fixed tail that grows by one entry at a time and is
+//! whole at every moment, for what each entry costs.
 //!
-//! Two files take turns. The one without the name lags a piece behind: it gets the pieces that it
+//! Two files take turns. The one without the name lags an entry behind: it gets the entries that it
 //! lacks and the tail, is brought to the disk, and takes the name by a rename; the one that had the
 //! name lags now. A reader, and whoever looks after a kill or on a full disk, finds the old file or
 //! the new one. Where the file system knows no hard links, the file is written whole each time.
@@ -18,7 +18,7 @@ pub struct GrowingFile {
     path: PathBuf,
     head: &'static str,
     tail: &'static str,
-    /// Length of the pieces, and where the last ones begin, from the end of the head.
+    /// Length of the entries, and where the last ones begin, from the end of the head.
     length: usize,
     lagging: Option<Lagging>,
     /// Bytes written so far.
@@ -28,7 +28,7 @@ pub struct GrowingFile {
 /// The file without the name.
 #[derive(Debug, Clone, Copy)]
 struct Lagging {
-    /// Length of the pieces in it.
+    /// Length of the entries in it.
     length: usize,
 }
 
@@ -43,16 +43,16 @@ impl GrowingFile {
         &self.path
     }
 
-    /// Adds the last of `pieces`. The others are those that the file holds already.
-    pub fn push<'a>(&mut self, pieces: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
+    /// Adds the last of `entries`. The others are those that the file holds already.
+    pub fn push<'a>(&mut self, entries: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
         let before = self.length;
-        let total: usize = pieces.clone().map(str::len).sum();
+        let total: usize = entries.clone().map(str::len).sum();
         let partial = partial_path(&self.path);
         let extended = self
             .lagging
             .take()
-            .is_some_and(|lagging| self.extend(&partial, lagging, pieces.clone()).is_ok());
-        let outcome = if extended { Ok(()) } else { self.write(&partial, pieces) };
+            .is_some_and(|lagging| self.extend(&partial, lagging, entries.clone()).is_ok());
+        let outcome = if extended { Ok(()) } else { self.write(&partial, entries) };
         let outcome = outcome.and_then(|()| self.give_name(&partial, before));
         self.length = total;
         outcome.map_err(|reason| {
@@ -62,11 +62,11 @@ impl GrowingFile {
     }
 
     /// Replaces all that the file holds.
-    pub fn replace<'a>(&mut self, pieces: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
+    pub fn replace<'a>(&mut self, entries: impl Iterator<Item = &'a str> + Clone) -> Result<()> {
         self.lagging = None;
-        self.length = pieces.clone().map(str::len).sum();
+        self.length = entries.clone().map(str::len).sum();
         let partial = partial_path(&self.path);
-        self.write(&partial, pieces).and_then(|()| fs::rename(&partial, &self.path)).map_err(
+        self.write(&partial, entries).and_then(|()| fs::rename(&partial, &self.path)).map_err(
             |reason| {
                 let _ = fs::remove_file(&partial);
                 cannot_write(&self.path, &reason)
@@ -74,15 +74,15 @@ impl GrowingFile {
         )
     }
 
-    /// The file holds these pieces, as another process left it.
-    pub fn assume<'a>(&mut self, pieces: impl Iterator<Item = &'a str>) {
+    /// The file holds these entries, as another process left it.
+    pub fn assume<'a>(&mut self, entries: impl Iterator<Item = &'a str>) {
         self.lagging = None;
-        self.length = pieces.map(str::len).sum();
+        self.length = entries.map(str::len).sum();
     }
 
-    fn write<'a>(&mut self, to: &Path, pieces: impl Iterator<Item = &'a str>) -> io::Result<()> {
+    fn write<'a>(&mut self, to: &Path, entries: impl Iterator<Item = &'a str>) -> io::Result<()> {
         let mut text = String::from(self.head);
-        text.extend(pieces);
+        text.extend(entries);
         text.push_str(self.tail);
         let mut file = fs::File::create(to)?;
         file.write_all(text.as_bytes())?;
@@ -95,7 +95,7 @@ impl GrowingFile {
         &mut self,
         at: &Path,
         lagging: Lagging,
-        pieces: impl Iterator<Item = &'a str>,
+        entries: impl Iterator<Item = &'a str>,
     ) -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).open(at)?;
         let end = self.head.len() + lagging.length;
@@ -105,11 +105,11 @@ impl GrowingFile {
         }
         let mut text = String::new();
         let mut begin = 0;
-        for piece in pieces {
+        for entry in entries {
             if begin >= lagging.length {
-                text.push_str(piece);
+                text.push_str(entry);
             }
-            begin += piece.len();
+            begin += entry.len();
         }
         text.push_str(self.tail);
         file.seek(SeekFrom::Start(end as u64))?;
@@ -118,7 +118,7 @@ impl GrowingFile {
         file.sync_all()
     }
 
-    /// Renames the file that is whole; the one that had the name, with `length` of pieces, lags from
+    /// Renames the file that is whole; the one that had the name, with `length` of entries, lags from
     /// now on.
     fn give_name(&mut self, whole: &Path, length: usize) -> io::Result<()> {
         let aside = partial_path(whole);
@@ -145,19 +145,19 @@ impl Drop for GrowingFile {
 mod tests {
     use super::*;
 
-    fn pieces(count: usize) -> Vec<String> {
-        (0..count).map(|k| format!("<piece {k}{}/>\n", ".".repeat(k % 7))).collect()
+    fn entries(count: usize) -> Vec<String> {
+        (0..count).map(|k| format!("<entry {k}{}/>\n", ".".repeat(k % 7))).collect()
     }
 
     #[test]
-    fn it_is_whole_after_every_piece_and_costs_what_the_pieces_cost() {
+    fn it_is_whole_after_every_entry_and_costs_what_the_entries_cost() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("series");
-        let pieces = pieces(500);
+        let entries = entries(500);
         let mut file = GrowingFile::new(&path, "<head>\n", "</head>\n");
-        for count in 1..=pieces.len() {
-            file.push(pieces[..count].iter().map(String::as_str)).unwrap();
-            let whole = format!("<head>\n{}</head>\n", pieces[..count].concat());
+        for count in 1..=entries.len() {
+            file.push(entries[..count].iter().map(String::as_str)).unwrap();
+            let whole = format!("<head>\n{}</head>\n", entries[..count].concat());
             assert_eq!(fs::read_to_string(&path).unwrap(), whole);
         }
         let size = fs::metadata(&path).unwrap().len();
@@ -170,8 +170,8 @@ mod tests {
     fn it_goes_on_from_what_another_left() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("series");
-        let pieces = pieces(6);
-        let part = |count: usize| pieces[..count].iter().map(String::as_str);
+        let entries = entries(6);
+        let part = |count: usize| entries[..count].iter().map(String::as_str);
         let mut file = GrowingFile::new(&path, "<", ">");
         (1..=4).for_each(|count| file.push(part(count)).unwrap());
         // Killed between the renames: all three names are there.
@@ -179,14 +179,14 @@ mod tests {
         std::mem::forget(file);
         let mut file = GrowingFile::new(&path, "<", ">");
         file.replace(part(2)).unwrap();
-        assert_eq!(fs::read_to_string(&path).unwrap(), format!("<{}>", pieces[..2].concat()));
+        assert_eq!(fs::read_to_string(&path).unwrap(), format!("<{}>", entries[..2].concat()));
         for count in 3..=6 {
             file.push(part(count)).unwrap();
             // A stranger changes the other file: it is written anew.
             if count == 4 {
                 fs::write(partial_path(&path), "?").unwrap();
             }
-            let whole = format!("<{}>", pieces[..count].concat());
+            let whole = format!("<{}>", entries[..count].concat());
             assert_eq!(fs::read_to_string(&path).unwrap(), whole);
         }
     }

@@ -17,7 +17,7 @@ const GRID_END: &str = "      </Grid>\n";
 pub const TAIL: &str = "    </Grid>\n  </Domain>\n</Xdmf>\n";
 
 /// The text of a frame whose data lie in the HDF5 file `data`, named without folder.
-pub fn piece(
+pub fn entry(
     (step, time): StepTime,
     frame: &Frame<'_>,
     (points, cells): Totals,
@@ -103,7 +103,7 @@ mod tests {
             point_data: vec![stress],
             cell_data: Vec::new(),
         };
-        piece((step, 0.1 * step as f64), &frame, (7, 7), &format!("points-{step:06}.h5"))
+        entry((step, 0.1 * step as f64), &frame, (7, 7), &format!("points-{step:06}.h5"))
     }
 
     #[test]

@@ -17,7 +17,7 @@ use crate::system::unknowns::Unknowns;
 
 use super::contest::Contest;
 use super::faulty::{of_first_point, place};
-use super::loads;
+use super::{loads, terms};
 
 /// Evaluates initial velocities, and loads and boundaries at both ends of the first step, at all
 /// points and nodes. Returns warnings. Errors name the key, its line and a point. Collective.
@@ -31,6 +31,7 @@ pub fn check<const D: usize>(
     velocities(world, &model.deck, points)?;
     if model.deck.analysis.kind != AnalysisType::Conditioning {
         loads::check(world, model, points, span)?;
+        terms::check(world, model, points)?;
     }
     boundaries(world, model, points, numbering, span)
 }

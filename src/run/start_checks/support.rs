@@ -1,39 +1,28 @@
 //! Do the conditions hold every connected piece of the material against rigid motion? Found before
 //! anything is solved or written: a quasi-static system that a rigid motion solves is singular.
 
-use std::collections::BTreeMap;
-
-use nalgebra::DMatrix;
-
 use crate::basis::{self, radial};
 use crate::contact::fields::Fields;
 use crate::contact::law::Friction;
-use crate::contact::start::corners_within;
+use crate::deck::Presence;
 use crate::deck::model::{Load, Symmetry};
-use crate::deck::schema::AXES;
-use crate::deck::{Presence, When};
 use crate::error::{Error, Result};
 use crate::ghost::FaceStencil;
-use crate::parallel::{World, exchange};
+use crate::parallel::World;
 use crate::points::Points;
 use crate::system::conditions::{Conditions, StepSpan};
 use crate::system::facing;
-use crate::system::numbering::Numbering;
-use crate::system::numbering::Touched;
+use crate::system::model::Model;
+use crate::system::numbering::{Numbering, Touched};
 use crate::system::populated::Populated;
 use crate::system::rim::Rim;
-use crate::system::supports::Support;
-use crate::system::terms::contact::TOUCH;
-use crate::system::terms::surface;
-
-use super::pieces;
-use crate::system::model::Model;
 use crate::system::step_system;
+use crate::system::terms::contact::TOUCH;
 use crate::system::unknowns::Unknowns;
 
-/// Share of the largest eigenvalue below which a motion counts as free. The rows are exact but
-/// for rounding; a held line of a thousandth of the body's length leaves 1e-6.
-const FREE: f64 = 1e-12;
+use super::holders::{Material, Touch};
+use super::pieces;
+use super::rigid_motions::{Extent, Held};
 
 /// An error where a rigid motion solves the first step's equations. Collective.
 pub fn require<const D: usize>(
@@ -60,17 +49,6 @@ pub fn require<const D: usize>(
              [[boundary]]"
         ))),
     }
-}
-
-/// Where another body holds a piece of the material.
-struct Touch<const D: usize> {
-    /// A node of the grid that moves the piece there.
-    node: usize,
-    /// m
-    place: [f64; D],
-    normal: [f64; D],
-    /// Along the surface, too.
-    rubs: bool,
 }
 
 /// [`loose`] where bodies touch each other: of each field alone, while the others stay where they are and hold it along
@@ -195,10 +173,8 @@ pub fn falls<const D: usize>(
 }
 
 /// A piece of the material and a rigid motion that nothing resists, in words: any, or one of the
-/// `pulled` axes. The piece is a body, with a point where it is not the whole of it. Every
-/// held component of a node is a row of the rigid motions' values there; the motions that all rows
-/// of a piece annihilate are free. Each piece is judged by the rank that owns its first node. The
-/// cells and nodes are those of [`crate::system::step_system::active`]; `touches`: where other bodies hold it. Collective.
+/// `pulled` axes. The piece is a body, with a point where it is not the whole of it. The cells and nodes are those of
+/// [`crate::system::step_system::active`]; `touches`: where other bodies hold it. Collective.
 fn loose<const D: usize>(
     world: &World,
     model: &Model<D>,
@@ -234,152 +210,23 @@ fn loose<const D: usize>(
         (hoops && axis == 0) || deck.loads.iter().any(|load| load.may_hold(axis))
     });
     let pieces = pieces::labels(world, grid, populated, &faces, numbering)?;
-    let (middle, length) = extent(world, points);
-    let motions = D + D * (D - 1) / 2;
-    let mut grams: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
+    let extent = Extent::of(world, points);
+    let mut held = Held::nowhere();
     for (local, &piece) in pieces.iter().enumerate().take(numbering.owned) {
-        let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
+        held.enter(piece);
         let x = grid.node_position(numbering.nodes[local]);
-        let x: [f64; D] = std::array::from_fn(|a| (x[a] - middle[a]) / length);
-        let held = |&c: &usize| conditions.fixed[local * D + c] || springs[c];
-        for component in (0..D).filter(held) {
-            let row = motions_at(&x, component);
-            for (i, a) in row.iter().enumerate() {
-                for (j, b) in row.iter().enumerate() {
-                    gram[i * motions + j] += a * b;
-                }
-            }
+        for axis in (0..D).filter(|&axis| conditions.fixed[local * D + axis] || springs[axis]) {
+            held.add(piece, &extent.component(&x, axis));
         }
     }
-    let extent = (middle, length);
-    add_supports(model, points, (numbering, first.stage), &pieces, extent, &mut grams)?;
-    let by_rigids = held_by_contact(model, points, (numbering, first), &pieces, (&middle, length));
-    let by_bodies = touches.iter().filter_map(|touch| {
-        let x: [f64; D] = std::array::from_fn(|a| (touch.place[a] - middle[a]) / length);
-        let rows = match touch.rubs {
-            true => (0..D).map(|i| motions_at(&x, i)).collect(),
-            false => vec![motions_along(&x, &touch.normal)],
-        };
-        Some((pieces[numbering.local(touch.node)?], rows))
-    });
-    for (piece, rows) in by_rigids.into_iter().chain(by_bodies) {
-        let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
-        for row in rows {
-            for (i, a) in row.iter().enumerate() {
-                for (j, b) in row.iter().enumerate() {
-                    gram[i * motions + j] += a * b;
-                }
-            }
-        }
-    }
-    let free = of_all_ranks(world, model, grams)?.into_iter().find_map(|(piece, gram)| {
-        if let Some(pulled) = pulled {
-            let axis = (0..D).find(|&a| pulled[a] && gram[a * motions + a] == 0.0)?;
-            return Some((piece, along_axis(axis)));
-        }
-        let spectrum = DMatrix::from_vec(motions, motions, gram).symmetric_eigen();
-        let largest = spectrum.eigenvalues.max();
-        let free = (0..motions).find(|&k| spectrum.eigenvalues[k] <= FREE * largest.max(1e-300))?;
-        Some((piece, name(spectrum.eigenvectors.column(free).iter().copied(), D)))
-    });
-    let first = world.min_u64(free.as_ref().map_or(u64::MAX, |(piece, _)| *piece));
-    let motion = free.filter(|(piece, _)| *piece == first).map(|(_, motion)| motion);
-    let Some(motion) = world.first_message(motion) else { return Ok(None) };
-    let what = name_piece(world, model, points, numbering, &pieces, first)?;
+    let material = Material { model, points, numbering, pieces: &pieces, extent: &extent };
+    material.by_supports(first.stage, &mut held)?;
+    material.by_terms(&mut held)?;
+    material.by_rigid_bodies(first, &mut held);
+    material.by_bodies(touches, &mut held);
+    let Some((piece, motion)) = held.free(world, model, pulled)? else { return Ok(None) };
+    let what = name_piece(world, model, points, numbering, &pieces, piece)?;
     Ok(Some((what, motion)))
-}
-
-/// Adds what surfaces that are held keep of the rigid motions: a row for each direction in which an
-/// element is held, to the piece that its carrier belongs to.
-fn add_supports<const D: usize>(
-    model: &Model<D>,
-    points: &Points<D>,
-    (numbering, stage): (&Numbering, usize),
-    pieces: &[u64],
-    (middle, length): ([f64; D], f64),
-    grams: &mut BTreeMap<u64, Vec<f64>>,
-) -> Result<()> {
-    let motions = D + D * (D - 1) / 2;
-    let (mut cells, mut nodes) = (Vec::new(), Vec::new());
-    for p in surface::carriers(model, points) {
-        cells.clear();
-        nodes.clear();
-        basis::populated_cells(&model.grid, model.deck.method.basis, points, p, None, &mut cells)?;
-        cells.iter().for_each(|&cell| model.grid.cell_nodes(cell, &mut nodes));
-        let Some(piece) = nodes.iter().find_map(|&n| numbering.local(n).map(|n| pieces[n])) else {
-            continue;
-        };
-        let holds = |support: &&Support<D>| {
-            model.deck.boundaries[support.boundary].presence.holds_in(stage)
-        };
-        for support in model.supports.iter().filter(holds) {
-            for own in support.surface.carried_by(points.id[p]) {
-                let place = own.element.place;
-                if support.within.as_ref().is_some_and(|sheet| !sheet.holds(&place)) {
-                    continue;
-                }
-                let x: [f64; D] = std::array::from_fn(|a| (place[a] - middle[a]) / length);
-                let gram = grams.entry(piece).or_insert_with(|| vec![0.0; motions * motions]);
-                for direction in support.projection(&own.element) {
-                    let mut row = vec![0.0; motions];
-                    for (component, share) in direction.iter().enumerate() {
-                        let all = motions_at(&x, component);
-                        row.iter_mut().zip(all).for_each(|(sum, value)| *sum += share * value);
-                    }
-                    for (i, a) in row.iter().enumerate() {
-                        for (j, b) in row.iter().enumerate() {
-                            gram[i * motions + j] += a * b;
-                        }
-                    }
-                }
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Rows of the rigid motions' values at the corners that touch a rigid surface, along its normal or,
-/// with friction, along all axes, each with its piece.
-fn held_by_contact<const D: usize>(
-    model: &Model<D>,
-    points: &Points<D>,
-    (numbering, span): (&Numbering, StepSpan),
-    pieces: &[u64],
-    (middle, length): (&[f64; D], f64),
-) -> Vec<(u64, Vec<Vec<f64>>)> {
-    let (contacts, basis) = (&model.contacts, model.deck.method.basis);
-    let (cell, stage) = (model.grid.cell_size(), span.stage);
-    // The points are where they are at the start of the run, and so is what they touch from then on.
-    // What comes with a later stage finds them somewhere near.
-    let stays = |presence: &Presence| presence.holds_in(stage) && presence.from <= Some(0);
-    let comes = |presence: &Presence| presence.holds_in(stage) && presence.from > Some(0);
-    let mut touching =
-        corners_within(contacts, basis, points, TOUCH * cell, (When::default(), stays));
-    touching.extend(corners_within(contacts, basis, points, cell, (span.start(), comes)));
-    let held = touching.into_iter().filter_map(|corner| {
-        let centre = &points.position[corner.point];
-        let near = model.grid.values_towards(&corner.place, centre, 0.0, None)?;
-        let nodes = near.nodes.iter().take(near.count);
-        let local = nodes.filter_map(|&node| numbering.local(node)).next()?;
-        let x: [f64; D] = std::array::from_fn(|a| (corner.place[a] - middle[a]) / length);
-        let law = &contacts.pairs[corner.pair].law;
-        let rows = if law.symmetric() {
-            vec![motions_along(&x, &corner.near.normal)]
-        } else {
-            (0..D).map(|i| motions_at(&x, i)).collect()
-        };
-        Some((pieces[local], rows))
-    });
-    held.collect()
-}
-
-/// What each rigid motion moves a place along a direction.
-fn motions_along<const D: usize>(x: &[f64; D], direction: &[f64; D]) -> Vec<f64> {
-    let rows = (0..D).map(|i| (direction[i], motions_at(x, i)));
-    rows.fold(vec![0.0; D + D * (D - 1) / 2], |mut sum, (share, row)| {
-        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += share * value);
-        sum
-    })
 }
 
 /// Ghost faces that hold cells together which share no node: only among simplices.
@@ -394,32 +241,6 @@ fn ties<const D: usize>(
     let rim = Rim::default();
     step_system::find_faces(world, model, (populated, &rim), &Fields::default())
         .map(|(faces, _)| faces)
-}
-
-/// The sums over all ranks of the pieces whose first node is owned here, ascending.
-fn of_all_ranks<const D: usize>(
-    world: &World,
-    model: &Model<D>,
-    grams: BTreeMap<u64, Vec<f64>>,
-) -> Result<BTreeMap<u64, Vec<f64>>> {
-    let mut outgoing: BTreeMap<usize, Vec<u64>> = BTreeMap::new();
-    let motions = D + D * (D - 1) / 2;
-    for (piece, gram) in grams {
-        let owner = model.partition.owner_of_node(&model.grid, piece as usize);
-        let list = outgoing.entry(owner).or_default();
-        list.push(piece);
-        list.extend(gram.iter().map(|value| value.to_bits()));
-    }
-    let mut sums: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-    for (_, words) in exchange(world, outgoing.into_iter().collect())? {
-        for record in words.chunks_exact(1 + motions * motions) {
-            let sum = sums.entry(record[0]).or_insert_with(|| vec![0.0; record.len() - 1]);
-            for (sum, &word) in sum.iter_mut().zip(&record[1..]) {
-                *sum += f64::from_bits(word);
-            }
-        }
-    }
-    Ok(sums)
 }
 
 /// The body of a piece, and its first point if it is not the whole body. Collective.
@@ -460,50 +281,4 @@ fn name_piece<const D: usize>(
         )
     });
     Ok(world.first_message(name).unwrap_or_default())
-}
-
-/// Middle and largest extent of all points.
-fn extent<const D: usize>(world: &World, points: &Points<D>) -> ([f64; D], f64) {
-    let end = |axis: usize, sign: f64| {
-        let own = points.position.iter().map(|x| sign * x[axis]).fold(f64::MIN, f64::max);
-        sign * world.max(own)
-    };
-    let high: [f64; D] = std::array::from_fn(|a| end(a, 1.0));
-    let low: [f64; D] = std::array::from_fn(|a| end(a, -1.0));
-    let length = (0..D).map(|a| high[a] - low[a]).fold(0.0, f64::max);
-    let middle = std::array::from_fn(|a| 0.5 * (high[a] + low[a]));
-    (middle, if length > 0.0 { length } else { 1.0 })
-}
-
-/// Component `c` of every rigid motion at `x`: translations, then turns in the planes of axes
-/// (0, 1), (1, 2), (2, 0).
-fn motions_at<const D: usize>(x: &[f64; D], component: usize) -> Vec<f64> {
-    let mut row = vec![0.0; D];
-    row[component] = 1.0;
-    for turn in 0..D * (D - 1) / 2 {
-        let (a, b) = (turn, (turn + 1) % D);
-        row.push(match component {
-            c if c == a => -x[b],
-            c if c == b => x[a],
-            _ => 0.0,
-        });
-    }
-    row
-}
-
-fn along_axis(axis: usize) -> String {
-    format!("move along {}", AXES[axis])
-}
-
-/// The motion in words.
-fn name(motion: impl Iterator<Item = f64>, dimension: usize) -> String {
-    let size: Vec<f64> = motion.map(f64::abs).collect();
-    let largest = (0..size.len()).max_by(|&a, &b| size[a].total_cmp(&size[b])).unwrap_or(0);
-    if largest < dimension {
-        along_axis(largest)
-    } else if dimension == 2 {
-        "turn".into()
-    } else {
-        format!("turn about {}", AXES[(largest - dimension + 2) % 3])
-    }
 }

@@ -161,10 +161,7 @@ impl<'a, const D: usize> FacingTerm<'a, D> {
         force: &mut [f64],
         mut rows: Option<&mut R>,
     ) {
-        let couples = match part {
-            Part::Reaching => &self.border.reaching,
-            Part::Inner => &self.border.inner,
-        };
+        let couples = self.border.of(part);
         let mut block = Vec::new();
         for k in couples.iter().cloned().flatten() {
             let (_, Some(response)) = self.at_end(k, at.displacement) else { continue };

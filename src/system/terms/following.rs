@@ -12,9 +12,9 @@ use crate::system::pattern::Pattern;
 use crate::system::step_system::Discretisation;
 
 use super::pressure::PressureTerm;
-use super::stress::StepPoints;
 use super::surface::SurfaceTerm;
 use super::term::{At, Part};
+use crate::system::step_points::StepPoints;
 
 /// Forces that follow an iterate of `N` unknowns per node. No call is made per point.
 pub trait Follow<const N: usize> {

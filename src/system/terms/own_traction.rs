@@ -6,8 +6,10 @@ use crate::tensor::dense::{self, Square};
 
 use crate::system::cell_rows::{Now, rows_now};
 
-use super::stress::{StepPoints, displacement_gradient, respond, respond_averaged};
+use super::point_response::{respond, respond_averaged};
 use super::term::Health;
+use crate::mechanics::displacement_gradient;
+use crate::system::step_points::StepPoints;
 
 /// T_ij a_j, N, with P~ of the previous frame and the area a at the step's start, m2; and where
 /// `wanted` d(T a)_i/du_bk of each node b of the point, N/m. Zero where the stress is not finite, which

@@ -9,8 +9,6 @@
 //! It equals its transposed: -f is the gradient of Σ V p. All state is that of the iterate, so that
 //! the frame in which stresses are written does not matter.
 
-use std::ops::Range;
-
 use crate::deck::When;
 use crate::loads::pressure::{Pressure, PressureAt};
 use crate::loads::{Moment, shares_of_bodies};
@@ -20,8 +18,10 @@ use crate::system::scatter::{BlockMatrix, BlockRows};
 use crate::tensor::dense;
 
 use super::block::add_block;
-use super::stress::{StepPoints, displacement_gradient, hoop_increment, start_volume};
+use super::point_response::start_volume;
 use super::term::{At, Part};
+use crate::mechanics::{displacement_gradient, hoop_increment};
+use crate::system::step_points::StepPoints;
 
 /// The pressures of a deck at one moment.
 pub struct PressureTerm<'a> {
@@ -58,28 +58,10 @@ impl<'a> PressureTerm<'a> {
         part: Part,
         at: At<'_>,
         force: &mut [f64],
-        rows: Option<&mut R>,
-    ) {
-        let which = match part {
-            Part::Reaching => &step.border.reaching,
-            Part::Inner => &step.border.inner,
-        };
-        self.assemble_groups(step, which, at.pattern, at.displacement, force, rows);
-    }
-
-    /// Adds the force of some groups' points at the local nodes, N, for the nodal increments
-    /// `displacement` (local), and the tangent of its negative where `rows` are given.
-    fn assemble_groups<const D: usize, R: BlockRows<D>>(
-        &self,
-        step: StepPoints<'_, D>,
-        which: &[Range<usize>],
-        pattern: &Pattern,
-        displacement: &[f64],
-        force: &mut [f64],
         mut rows: Option<&mut R>,
     ) {
         let mut block = Vec::new();
-        for group in which.iter().cloned().flatten() {
+        for group in step.groups_of(part) {
             let nodes = step.nodes_of_group(group);
             block.clear();
             if rows.is_some() {
@@ -87,10 +69,10 @@ impl<'a> PressureTerm<'a> {
             }
             let mut acts = false;
             for &p in step.groups.points(group) {
-                acts |= self.add_point(step, p, nodes, displacement, force, &mut block);
+                acts |= self.add_point(step, p, nodes, at.displacement, force, &mut block);
             }
             if let Some(rows) = rows.as_deref_mut().filter(|_| acts) {
-                add_block(pattern, group, nodes, &block, rows);
+                add_block(at.pattern, group, nodes, &block, rows);
             }
         }
     }

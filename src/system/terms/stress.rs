@@ -1,63 +1,23 @@
 //! f_int = Σ_p ∇S^T T V and K = Σ_p ∇S^T A ∇S V (Lagrangian eq. 20-23, 27, 28), one dense block
-//! per group of points that share their nodes. With axisymmetry the hoop joins: [`mechanics::ring`].
+//! per group of points that share their nodes. With axisymmetry the hoop joins: [`crate::mechanics::ring`].
 
 use std::ops::Range;
 
-use crate::basis::{Groups, Influences};
-use crate::deck::model::{Frame, PointVolume};
-use crate::material::{Material, local};
-use crate::mechanics::{
-    self, Contribution, Dilation, Expansion, Hoop, Increment, StepStart, StressState,
-};
-use crate::points::Points;
-use crate::tensor::dense;
+use crate::deck::model::Frame;
+use crate::material::local;
+use crate::mechanics::{Contribution, Expansion, Increment, displacement_gradient, hoop_increment};
 use crate::tensor::fused::{self, multiply_add};
 
-use crate::system::border::Border;
 use crate::system::cell_rows::CellRows;
 use crate::system::in_place::InPlace;
 use crate::system::kernel::Batch;
 use crate::system::numbering::Numbering;
 use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockRows;
+use crate::system::step_points::StepPoints;
 
-pub use crate::mechanics::{displacement_gradient, hoop_increment};
-
+use super::point_response::{respond, respond_ring_shared, respond_shared};
 use super::term::{At, Health, Part, Term};
-
-/// What a step's points look like to the equations: fixed while the step is solved.
-#[derive(Clone, Copy)]
-pub struct StepPoints<'a, const D: usize> {
-    /// At the start of the step.
-    pub points: &'a Points<D>,
-    /// One material per body.
-    pub materials: &'a [Material],
-    /// Their basis functions.
-    pub influences: &'a Influences<D>,
-    /// Points that touch the same nodes.
-    pub groups: &'a Groups,
-    /// Local node index of each entry of `groups.nodes`.
-    pub group_nodes: &'a [u32],
-    /// Groups that touch nodes of other ranks, and the others.
-    pub border: &'a Border,
-    /// What stresses are integrated over.
-    pub volume: PointVolume,
-}
-
-impl<'a, const D: usize> StepPoints<'a, D> {
-    /// Local nodes of a group of points.
-    #[inline]
-    pub fn nodes_of_group(&self, group: usize) -> &'a [u32] {
-        let offsets = &self.groups.node_offsets;
-        &self.group_nodes[offsets[group]..offsets[group + 1]]
-    }
-
-    /// Local nodes of point `p`, in the order of its influences.
-    #[inline]
-    pub fn nodes_of(&self, p: usize) -> &'a [u32] {
-        self.nodes_of_group(self.groups.group_of_point[p])
-    }
-}
 
 /// The stress of the points as a term of the equations.
 pub struct Stress<'a, const D: usize> {
@@ -81,11 +41,7 @@ impl<const D: usize> Term<D> for Stress<'_, D> {
         force: &mut [f64],
         rows: Option<&mut InPlace<'_, D>>,
     ) -> Health {
-        let border = self.step.border;
-        let which = match part {
-            Part::Reaching => &border.reaching,
-            Part::Inner => &border.inner,
-        };
+        let which = self.step.border.of(part);
         assemble_groups(self.step, which, self.frame, at.pattern, at.displacement, force, rows)
     }
 
@@ -444,130 +400,4 @@ impl<const D: usize> Task<'_, D> {
             work.batch.push::<D, FUSED>(&work.gradients, contribution);
         }
     }
-}
-
-/// Stress and tangent of a point; `None`, and a note in `health`, if the stress is not finite.
-#[inline(always)]
-pub(crate) fn respond<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    p: usize,
-    increment: &[[f64; D]; D],
-    health: &mut Health,
-) -> Option<Contribution<D>> {
-    let (contribution, state) = mechanics::contribution(frame, &start(step, p), increment);
-    sound(p, increment.into(), &state, health).then_some(contribution)
-}
-
-/// [`respond`] of a ring, with F-bar where det dF_0 - 1 is given.
-pub(crate) fn respond_ring<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    p: usize,
-    increment: Increment<'_, D>,
-    common: Option<f64>,
-    health: &mut Health,
-) -> Option<(Contribution<D>, Hoop<D>)> {
-    let (contribution, hoop, state) =
-        mechanics::ring_contribution(frame, &start(step, p), increment, common);
-    sound(p, increment, &state, health).then_some((contribution, hoop))
-}
-
-/// [`respond_ring`] for the assembly, with F-bar in two parts where det dF_0 - 1 is given.
-#[inline(always)]
-fn respond_ring_shared<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    p: usize,
-    increment: Increment<'_, D>,
-    common: Option<f64>,
-    health: &mut Health,
-) -> Option<(Contribution<D>, Hoop<D>, Option<Expansion<D>>)> {
-    let Some(common) = common else {
-        let (contribution, hoop) = respond_ring(step, frame, p, increment, None, health)?;
-        return Some((contribution, hoop, None));
-    };
-    let (contribution, hoop, share, state) =
-        mechanics::shared_ring_contribution(frame, &start(step, p), increment, common);
-    sound(p, increment, &state, health).then_some((contribution, hoop, Some(share)))
-}
-
-/// [`respond`] with F-bar, in two parts, to dF - 1 and det dF_0 - 1 of its cells.
-#[inline(always)]
-fn respond_shared<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    p: usize,
-    increment: &[[f64; D]; D],
-    common: f64,
-    health: &mut Health,
-) -> Option<(Contribution<D>, Expansion<D>)> {
-    let (contribution, share, state) =
-        mechanics::shared_contribution(frame, &start(step, p), increment, common);
-    sound(p, increment.into(), &state, health).then_some((contribution, share))
-}
-
-/// [`respond`] with F-bar as the formulas read, to dF - 1 and det dF_0 - 1 of its cells.
-pub(crate) fn respond_averaged<const D: usize>(
-    step: StepPoints<'_, D>,
-    frame: Frame,
-    p: usize,
-    increment: &[[f64; D]; D],
-    common: f64,
-    health: &mut Health,
-) -> Option<(Contribution<D>, Dilation<D>)> {
-    let (contribution, dilation, state) =
-        mechanics::averaged_contribution(frame, &start(step, p), increment, common);
-    sound(p, increment.into(), &state, health).then_some((contribution, dilation))
-}
-
-#[inline(always)]
-fn start<const D: usize>(step: StepPoints<'_, D>, p: usize) -> StepStart<'_> {
-    let points = step.points;
-    StepStart {
-        material: local(step.materials, points, p),
-        state: points.state.of(p, points.body[p]),
-        deformation_gradient: &points.deformation_gradient[p],
-        elastic_excess: &points.elastic_excess[p],
-        volume_initial: start_volume(step, p),
-    }
-}
-
-/// Notes in `health` what is wrong with a point; false if its stress is not finite.
-#[inline(always)]
-fn sound<const D: usize>(
-    p: usize,
-    increment: Increment<'_, D>,
-    state: &StressState,
-    health: &mut Health,
-) -> bool {
-    let inverted = dense::determinant(&dense::plus_unit(increment.block)) <= 0.0;
-    if inverted || increment.hoop <= -1.0 {
-        health.inverted.get_or_insert(p);
-    }
-    let finite = state.kirchhoff_stress.iter().all(|t| t.is_finite());
-    if !finite {
-        health.not_finite.get_or_insert(p);
-    }
-    finite
-}
-
-/// The initial volume that forces of point `p` are integrated over, m3.
-#[inline(always)]
-pub(crate) fn start_volume<const D: usize>(step: StepPoints<'_, D>, p: usize) -> f64 {
-    match step.volume {
-        PointVolume::Deformation => step.points.volume_initial[p],
-        PointVolume::Domain => domain_volume(step.points, p),
-    }
-}
-
-/// V_d / det F, with V_d the volume of the domain at the step's start, m3.
-#[cold]
-fn domain_volume<const D: usize>(points: &Points<D>, p: usize) -> f64 {
-    let (now, start) = (&points.half_length[p], &points.half_length_initial[p]);
-    let ratio: f64 = now.iter().zip(start).map(|(now, start)| now / start).product();
-    // A ring's hoop is no side of its domain.
-    let gradient = &points.deformation_gradient[p];
-    let hoop = if D == 2 { gradient[(2, 2)] } else { 1.0 };
-    points.volume_initial[p] * ratio * hoop / gradient.determinant()
 }

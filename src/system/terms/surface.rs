@@ -21,8 +21,8 @@ use crate::deck::expression::Expression;
 use crate::grid::Grid;
 use crate::loads::pressure::{Pressure, PressureAt};
 use crate::loads::{Moment, OnSurface, shares_of_bodies};
-use crate::points::Points;
 use crate::surface::{Carried, Element, norm};
+use crate::system::carried::{area_of, carried_area, grid_weights, place_of};
 use crate::system::holds;
 use crate::system::model::Model;
 use crate::system::pattern::Pattern;
@@ -32,8 +32,9 @@ use crate::tensor::dense;
 
 use super::block::add_block;
 use super::own_traction;
-use super::stress::{StepPoints, displacement_gradient};
 use super::term::{At, Part};
+use crate::mechanics::displacement_gradient;
+use crate::system::step_points::StepPoints;
 
 /// Everything that acts on surfaces at one moment, as this rank's points carry it.
 pub struct SurfaceTerm<'a, const D: usize> {
@@ -66,9 +67,6 @@ enum Kind<'a, const D: usize> {
     Held(&'a Support<D>, f64, Element<D>),
 }
 
-/// Weights up to this are those of round-off.
-const NO_WEIGHT: f64 = 1e-12;
-
 /// What a support bears, this rank's share: force, sum of magnitudes, torque about z through the
 /// origin, and volume of the points that carry it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -98,7 +96,7 @@ impl Borne {
 
 impl<'a, const D: usize> SurfaceTerm<'a, D> {
     /// `None` where nothing of the deck acts on a surface. `carriers`: this rank's points that carry
-    /// elements ([`carriers`]).
+    /// elements ([`crate::system::carried::carriers`]).
     pub fn new(
         model: &'a Model<D>,
         step: StepPoints<'_, D>,
@@ -417,22 +415,6 @@ impl<'a, const D: usize> SurfaceTerm<'a, D> {
     }
 }
 
-/// This rank's points that carry elements of any surface of the deck.
-pub fn carriers<const D: usize>(model: &Model<D>, points: &Points<D>) -> Vec<usize> {
-    if !model.acts_on_surfaces() {
-        return Vec::new();
-    }
-    let surfaces = || {
-        let loads = model.loads.iter().filter_map(|load| load.on_surface());
-        let of_loads = loads.map(|load| match load {
-            OnSurface::Traction { surface, .. } | OnSurface::Pressure { surface, .. } => surface,
-        });
-        of_loads.chain(model.supports.iter().map(|support| &support.surface))
-    };
-    let carries = |&p: &usize| surfaces().any(|s| !s.carried_by(points.id[p]).is_empty());
-    (0..points.len()).filter(carries).collect()
-}
-
 /// Adds to a dense block of `count` nodes: entries (a, i, b, ·) are `entry(b, row of a, i)`.
 fn add_products<const D: usize, T>(
     block: &mut [f64],
@@ -449,53 +431,4 @@ fn add_products<const D: usize, T>(
             }
         }
     }
-}
-
-/// F of a point in the axes of the grid.
-fn in_space<const D: usize>(points: &Points<D>, p: usize) -> dense::Square<D> {
-    let gradient = &points.deformation_gradient[p];
-    std::array::from_fn(|i| std::array::from_fn(|j| gradient[(i, j)]))
-}
-
-/// x_s = x_p + F (X_s - X_p)
-pub fn place_of<const D: usize>(points: &Points<D>, p: usize, own: &Carried<D>) -> [f64; D] {
-    let offset = dense::apply(&in_space(points, p), &own.offset);
-    std::array::from_fn(|i| points.position[p][i] + offset[i])
-}
-
-/// Area vector of an element that is at `place` now, m2 (m in 2D). Around the axis a ring has grown with its radius.
-pub(crate) fn area_of<const D: usize>(
-    points: &Points<D>,
-    p: usize,
-    own: &Carried<D>,
-    place: &[f64; D],
-    rings: bool,
-) -> [f64; D] {
-    let area = carried_area(&in_space(points, p), &own.element.area);
-    if rings { area.map(|a| a * place[0] / own.element.place[0]) } else { area }
-}
-
-/// The grid's functions N(x) at these `nodes`, ascending; `None` where others have a weight.
-pub(crate) fn grid_weights<const D: usize>(
-    grid: &Grid<D>,
-    x: &[f64; D],
-    nodes: &[usize],
-) -> Option<Vec<f64>> {
-    let values = grid.interpolate(x, 0.0, None)?.values;
-    let mut weights = vec![0.0; nodes.len()];
-    for (&node, &weight) in values.nodes.iter().zip(&values.weights).take(values.count) {
-        match nodes.binary_search(&node) {
-            Ok(a) => weights[a] = weight,
-            // Nodes off a face that the place lies on.
-            Err(_) if weight.abs() < NO_WEIGHT => {}
-            Err(_) => return None,
-        }
-    }
-    Some(weights)
-}
-
-/// det F F^-T A (Nanson).
-fn carried_area<const D: usize>(gradient: &dense::Square<D>, area: &[f64; D]) -> [f64; D] {
-    let (inverse, determinant) = dense::inverse(gradient);
-    std::array::from_fn(|i| determinant * (0..D).map(|j| inverse[j][i] * area[j]).sum::<f64>())
 }

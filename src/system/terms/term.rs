@@ -5,6 +5,8 @@ use crate::system::pattern::Pattern;
 use crate::system::scatter::BlockMatrix;
 use crate::tensor::Square;
 
+pub use crate::system::border::Part;
+
 /// An iterate.
 #[derive(Clone, Copy)]
 pub struct At<'a> {
@@ -16,16 +18,6 @@ pub struct At<'a> {
 
 /// An addition to a matrix: two local nodes and the block that couples them, N/m.
 pub type Correction<const D: usize> = (u32, u32, Square<D>);
-
-/// Which shares are asked for. Those that other ranks wait for come first, and are on their way while the rest is
-/// summed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// Those that reach nodes of other ranks.
-    Reaching,
-    /// The others.
-    Inner,
-}
 
 /// Health of an evaluation on this rank.
 #[derive(Debug, Clone, Copy, Default)]

@@ -1,4 +1,4 @@
-//! Smooth pieces of the surfaces of forms, each the image of the unit interval (2D) or square (3D).
+//! Smooth patches of the surfaces of forms, each the image of the unit interval (2D) or square (3D).
 
 use std::f64::consts::{PI, TAU};
 
@@ -6,8 +6,8 @@ use crate::deck::shape::{Form, padded};
 
 type Vector = [f64; 3];
 
-/// A smooth piece of a surface in the frame of its form.
-pub enum Piece {
+/// A smooth patch of a surface in the frame of its form.
+pub enum Patch {
     /// corner + s u + t v; in 2D v is the unit vector along z and t does not matter.
     Flat { corner: Vector, u: Vector, v: Vector },
     /// corner + s ((1 - t) u + t v) (3D).
@@ -20,53 +20,53 @@ pub enum Piece {
     Tube { from: Vector, frame: [Vector; 3], length: f64, radius: f64 },
 }
 
-impl Piece {
-    /// Lengths along s and t, m: what a piece is cut by.
+impl Patch {
+    /// Lengths along s and t, m: what a patch is cut by.
     pub fn extent(&self) -> [f64; 2] {
         match self {
-            Piece::Flat { u, v, .. } => [norm(u), norm(v)],
-            Piece::Triangle { u, v, .. } => [norm(u).max(norm(v)), norm(&minus(v, u))],
-            Piece::Arc { semi, turn, .. } => [semi[0].max(semi[1]) * turn.abs(), 1.0],
-            Piece::Dome { semi, height, .. } => {
+            Patch::Flat { u, v, .. } => [norm(u), norm(v)],
+            Patch::Triangle { u, v, .. } => [norm(u).max(norm(v)), norm(&minus(v, u))],
+            Patch::Arc { semi, turn, .. } => [semi[0].max(semi[1]) * turn.abs(), 1.0],
+            Patch::Dome { semi, height, .. } => {
                 let largest = semi.iter().copied().fold(0.0, f64::max);
                 [TAU * largest, largest * (height[1].acos() - height[0].acos()).abs()]
             }
-            Piece::Tube { length, radius, .. } => [TAU * radius, *length],
+            Patch::Tube { length, radius, .. } => [TAU * radius, *length],
         }
     }
 
     /// Whether it is flat, so that the mean of places on it lies on it.
     pub fn is_flat(&self) -> bool {
-        matches!(self, Piece::Flat { .. } | Piece::Triangle { .. })
+        matches!(self, Patch::Flat { .. } | Patch::Triangle { .. })
     }
 
-    /// Numbers of cuts along s and t are multiples of these: pieces that are round are cut at their
+    /// Numbers of cuts along s and t are multiples of these: patches that are round are cut at their
     /// quadrants.
     pub fn folds(&self) -> [usize; 2] {
         match self {
-            Piece::Flat { .. } | Piece::Triangle { .. } => [1, 1],
-            Piece::Arc { turn, .. } => [((4.0 * turn.abs() / TAU).round() as usize).max(1), 1],
-            Piece::Dome { .. } => [4, 2],
-            Piece::Tube { .. } => [4, 1],
+            Patch::Flat { .. } | Patch::Triangle { .. } => [1, 1],
+            Patch::Arc { turn, .. } => [((4.0 * turn.abs() / TAU).round() as usize).max(1), 1],
+            Patch::Dome { .. } => [4, 2],
+            Patch::Tube { .. } => [4, 1],
         }
     }
 
     /// Place, m, and area vector per ds dt, m2 (2D: per ds, m), of either orientation.
     pub fn at(&self, s: f64, t: f64) -> (Vector, Vector) {
         match self {
-            Piece::Flat { corner, u, v } => {
+            Patch::Flat { corner, u, v } => {
                 (std::array::from_fn(|i| corner[i] + s * u[i] + t * v[i]), cross(u, v))
             }
-            Piece::Triangle { corner, u, v } => {
+            Patch::Triangle { corner, u, v } => {
                 let place = std::array::from_fn(|i| corner[i] + s * ((1.0 - t) * u[i] + t * v[i]));
                 (place, cross(u, v).map(|a| s * a))
             }
-            Piece::Arc { centre, semi, from, turn } => {
+            Patch::Arc { centre, semi, from, turn } => {
                 let (sin, cos) = (from + s * turn).sin_cos();
                 let place = [centre[0] + semi[0] * cos, centre[1] + semi[1] * sin, 0.0];
                 (place, [semi[1] * cos * turn, semi[0] * sin * turn, 0.0])
             }
-            Piece::Dome { centre, semi, frame, height } => {
+            Patch::Dome { centre, semi, frame, height } => {
                 // Equal heights of a sphere have equal areas.
                 let z = height[0] + t * (height[1] - height[0]);
                 let (sin, cos) = (TAU * s).sin_cos();
@@ -79,7 +79,7 @@ impl Piece {
                 let place = std::array::from_fn(|i| centre[i] + semi[i] * n[i]);
                 (place, std::array::from_fn(|i| share * volume / semi[i] * n[i]))
             }
-            Piece::Tube { from, frame, length, radius } => {
+            Patch::Tube { from, frame, length, radius } => {
                 let (sin, cos) = (TAU * s).sin_cos();
                 let n: Vector = std::array::from_fn(|i| cos * frame[0][i] + sin * frame[1][i]);
                 let place =
@@ -91,7 +91,7 @@ impl Piece {
 }
 
 /// The surface of a form that is no set of shapes; none of a condition.
-pub fn of_form(form: &Form, dimension: usize) -> Vec<Piece> {
+pub fn of_form(form: &Form, dimension: usize) -> Vec<Patch> {
     match form {
         Form::Box { min, max } => of_box(&padded(min), &padded(max), dimension),
         Form::Ball { centre, radius } => round(&padded(centre), [*radius; 3], dimension),
@@ -110,7 +110,7 @@ pub fn of_form(form: &Form, dimension: usize) -> Vec<Piece> {
                 .collect()
         }
         Form::Solid(solid) => {
-            let of_triangle = |[p, q, r]: &[Vector; 3]| Piece::Triangle {
+            let of_triangle = |[p, q, r]: &[Vector; 3]| Patch::Triangle {
                 corner: *p,
                 u: minus(q, p),
                 v: minus(r, p),
@@ -121,11 +121,11 @@ pub fn of_form(form: &Form, dimension: usize) -> Vec<Piece> {
     }
 }
 
-fn segment(from: Vector, to: Vector) -> Piece {
-    Piece::Flat { corner: from, u: minus(&to, &from), v: [0.0, 0.0, 1.0] }
+fn segment(from: Vector, to: Vector) -> Patch {
+    Patch::Flat { corner: from, u: minus(&to, &from), v: [0.0, 0.0, 1.0] }
 }
 
-fn of_box(min: &Vector, max: &Vector, dimension: usize) -> Vec<Piece> {
+fn of_box(min: &Vector, max: &Vector, dimension: usize) -> Vec<Patch> {
     if dimension == 2 {
         let corners = [[min[0], min[1]], [max[0], min[1]], [max[0], max[1]], [min[0], max[1]]];
         let at = |k: usize| [corners[k % 4][0], corners[k % 4][1], 0.0];
@@ -136,29 +136,33 @@ fn of_box(min: &Vector, max: &Vector, dimension: usize) -> Vec<Piece> {
         u[axis] = max[axis] - min[axis];
         u
     };
-    let mut pieces = Vec::new();
+    let mut patches = Vec::new();
     for axis in 0..3 {
         for end in [min, max] {
             let mut corner = *min;
             corner[axis] = end[axis];
-            pieces.push(Piece::Flat { corner, u: along((axis + 1) % 3), v: along((axis + 2) % 3) });
+            patches.push(Patch::Flat {
+                corner,
+                u: along((axis + 1) % 3),
+                v: along((axis + 2) % 3),
+            });
         }
     }
-    pieces
+    patches
 }
 
-fn round(centre: &Vector, semi: Vector, dimension: usize) -> Vec<Piece> {
+fn round(centre: &Vector, semi: Vector, dimension: usize) -> Vec<Patch> {
     if dimension == 2 {
         let semi = [semi[0], semi[1]];
-        return vec![Piece::Arc { centre: *centre, semi, from: 0.0, turn: TAU }];
+        return vec![Patch::Arc { centre: *centre, semi, from: 0.0, turn: TAU }];
     }
     let height = [-1.0, 1.0];
-    vec![Piece::Dome { centre: *centre, semi, frame: AXES, height }]
+    vec![Patch::Dome { centre: *centre, semi, frame: AXES, height }]
 }
 
 const AXES: [Vector; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-fn of_capsule(from: &Vector, to: &Vector, radius: f64, dimension: usize) -> Vec<Piece> {
+fn of_capsule(from: &Vector, to: &Vector, radius: f64, dimension: usize) -> Vec<Patch> {
     let axis = minus(to, from);
     let length = norm(&axis);
     if length == 0.0 {
@@ -174,9 +178,9 @@ fn of_capsule(from: &Vector, to: &Vector, radius: f64, dimension: usize) -> Vec<
         let semi = [radius; 2];
         return vec![
             segment(beside(from, -1.0), beside(to, -1.0)),
-            Piece::Arc { centre: *to, semi, from: angle - 0.5 * PI, turn: PI },
+            Patch::Arc { centre: *to, semi, from: angle - 0.5 * PI, turn: PI },
             segment(beside(to, 1.0), beside(from, 1.0)),
-            Piece::Arc { centre: *from, semi, from: angle + 0.5 * PI, turn: PI },
+            Patch::Arc { centre: *from, semi, from: angle + 0.5 * PI, turn: PI },
         ];
     }
     // Two directions across the axis.
@@ -187,9 +191,9 @@ fn of_capsule(from: &Vector, to: &Vector, radius: f64, dimension: usize) -> Vec<
     let frame = [first, cross(&axis, &first), axis];
     let semi = [radius; 3];
     vec![
-        Piece::Tube { from: *from, frame, length, radius },
-        Piece::Dome { centre: *to, semi, frame, height: [0.0, 1.0] },
-        Piece::Dome { centre: *from, semi, frame, height: [-1.0, 0.0] },
+        Patch::Tube { from: *from, frame, length, radius },
+        Patch::Dome { centre: *to, semi, frame, height: [0.0, 1.0] },
+        Patch::Dome { centre: *from, semi, frame, height: [-1.0, 0.0] },
     ]
 }
 
