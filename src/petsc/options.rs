@@ -82,20 +82,35 @@ pub fn clear_all(prefix: &str) -> Result<()> {
 
 /// Options set by the user and read by no object so far, as `-name value`.
 pub fn unused() -> Result<Vec<String>> {
+    let ours = |name: &String| built_in(|names| names.contains(name));
+    let theirs = unread()?.into_iter().filter(|(name, _)| !ours(name));
+    let mut left: Vec<String> = theirs
+        .map(|(name, value)| if value.is_empty() { name } else { format!("{name} {value}") })
+        .collect();
+    left.sort();
+    Ok(left)
+}
+
+/// Removes the program's own defaults that no object has read: newer versions of PETSc end with a warning of
+/// them, as if the user had misspelt one.
+pub fn clear_unread_defaults() -> Result<()> {
+    for (name, _) in unread()? {
+        if built_in(|names| names.contains(&name)) {
+            clear(&name)?;
+        }
+    }
+    Ok(())
+}
+
+/// Name and value of the options that no object has read.
+fn unread() -> Result<Vec<(String, String)>> {
     require_running()?;
     let (mut count, mut names, mut values) = (0, null_mut(), null_mut());
     petsc!(PetscOptionsLeftGet(null_mut(), &mut count, &mut names, &mut values))?;
-    let mut left = Vec::new();
-    for k in 0..count as usize {
-        // SAFETY: PETSc returned `count` names and values; a value may be null.
-        let (name, value) = unsafe { (text_of(*names.add(k)), text_of(*values.add(k))) };
-        let name = dashed(&name);
-        if !built_in(|names| names.contains(&name)) {
-            left.push(if value.is_empty() { name } else { format!("{name} {value}") });
-        }
-    }
+    // SAFETY: PETSc returned `count` names and values; a value may be null.
+    let text = |k: usize| unsafe { (dashed(&text_of(*names.add(k))), text_of(*values.add(k))) };
+    let left = (0..count as usize).map(text).collect();
     petsc!(PetscOptionsLeftRestore(null_mut(), &mut count, &mut names, &mut values))?;
-    left.sort();
     Ok(left)
 }
 

@@ -123,12 +123,13 @@ impl Drop for Session<'_> {
 /// This rank, and the outcome of PETSc's end.
 fn finalize() -> (i32, Result<()>) {
     let mut rank = 0;
+    let cleared = options::clear_unread_defaults();
     // SAFETY: PETSc was started by a session and MPI is alive (borrow of the universe).
     let code = unsafe {
         mpi::ffi::MPI_Comm_rank(mpi::ffi::RSMPI_COMM_WORLD, &mut rank);
         sys::PetscFinalize()
     };
-    (rank, check(code, "PetscFinalize"))
+    (rank, check(code, "PetscFinalize").and(cleared))
 }
 
 /// The full argument list, program name first.
