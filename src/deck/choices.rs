@@ -1,10 +1,4 @@
-//! The deck's own words for the enumerations of the model.
-
-use super::model::{
-    AffineTransfer, AnalysisType, Cost, DomainUpdate, Element, ElementPath, Format, Frame,
-    GhostScaling, GimpEdge, Initial, InvertedIterates, Locking, Mass, OnFailure, PointVolume,
-    PositionUpdate, StressUpdate, SupportMethod, Symmetry, Tangent, VerifyNorm,
-};
+//! Enumerations of the model, each with the deck's own words for its values.
 
 /// An enumeration that the deck spells in words.
 pub trait Choice: Copy + PartialEq + 'static {
@@ -12,9 +6,19 @@ pub trait Choice: Copy + PartialEq + 'static {
     const SPELLINGS: &'static [(&'static str, Self)];
 }
 
+/// Declares enumerations: each value with its word, in the order of the documentation.
 macro_rules! choices {
-    ($( $type:ident { $( $word:literal => $variant:ident ),* $(,)? } )*) => { $(
-        impl Choice for $type {
+    ($(
+        $( #[$about:meta] )*
+        $type:ident { $( $( #[$of_value:meta] )* $variant:ident = $word:literal, )* }
+    )*) => { $(
+        $( #[$about] )*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $type {
+            $( $( #[$of_value] )* $variant, )*
+        }
+
+        impl $crate::deck::choices::Choice for $type {
             const SPELLINGS: &'static [(&'static str, Self)] = &[ $( ($word, $type::$variant) ),* ];
         }
 
@@ -29,51 +33,4 @@ macro_rules! choices {
         }
     )* };
 }
-
-choices! {
-    AnalysisType {
-        "quasi-static" => QuasiStatic,
-        "explicit" => Explicit,
-        "implicit-dynamic" => ImplicitDynamic,
-        "conditioning" => Conditioning,
-        "strength-reduction" => StrengthReduction,
-        "element-test" => ElementTest,
-    }
-    ElementPath {
-        "triaxial-drained" => TriaxialDrained,
-        "triaxial-undrained" => TriaxialUndrained,
-        "oedometer" => Oedometer,
-        "isotropic" => Isotropic,
-        "simple-shear" => SimpleShear,
-        "biaxial" => Biaxial,
-        "strain" => Strain,
-    }
-    Symmetry { "plane-strain" => PlaneStrain, "axisymmetric" => Axisymmetric }
-    OnFailure { "stop" => Stop, "cut" => Cut }
-    InvertedIterates { "reject" => Reject, "allow" => Allow }
-    Tangent { "auto" => Auto, "unsymmetric" => Unsymmetric }
-    AffineTransfer { "apic" => Apic, "tpic" => Tpic }
-    DomainUpdate {
-        "none" => None,
-        "det" => Det,
-        "normal" => Normal,
-        "stretch" => Stretch,
-        "corners" => Corners,
-        "normal-corrected" => NormalCorrected,
-        "normal-incremental" => NormalIncremental,
-    }
-    GimpEdge { "continued" => Continued, "published" => Published }
-    PointVolume { "deformation" => Deformation, "domain" => Domain }
-    Locking { "none" => None, "f-bar" => FBar }
-    Frame { "previous" => Previous, "updated" => Updated, "total" => Total }
-    Mass { "consistent" => Consistent, "lumped" => Lumped }
-    StressUpdate { "usf" => Usf, "usl" => Usl, "musl" => Musl }
-    PositionUpdate { "momentum" => Momentum, "published" => Published }
-    GhostScaling { "scale-free" => ScaleFree, "literal" => Literal, "published" => Published }
-    Element { "quad4" => Quad4, "tri3" => Tri3, "hex8" => Hex8, "tet4" => Tet4 }
-    Initial { "balanced" => Balanced, "slabs" => Slabs }
-    Cost { "points" => Points, "time" => Time }
-    SupportMethod { "penalty" => Penalty, "nitsche" => Nitsche }
-    Format { "xdmf" => Xdmf, "vtkhdf" => VtkHdf, "vtu" => Vtu }
-    VerifyNorm { "volume-l1" => VolumeL1, "volume-l2" => VolumeL2, "max" => Max }
-}
+pub(crate) use choices;

@@ -4,13 +4,12 @@
 //! The mean over a body is weighted by the initial volume.
 
 use crate::deck::Deck;
-use crate::deck::fields;
+use crate::deck::fields::{Field, PointField};
 use crate::deck::model::{Probe, Spot};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::output::directory::{PROBES, ResultsDirectory};
 use crate::output::restart::run_state::RunState;
-use crate::output::series::point_field::PointField;
 use crate::output::tables::csv_table::{CsvTable, Mark};
 use crate::output::tables::history::HistoryRow;
 use crate::output::terminal::log::Log;
@@ -179,18 +178,16 @@ fn columns_of(
     for word in &probe.fields {
         let (field, component) = PointField::parse_selector(word)?;
         let base = format!("{}.{}", probe.name, field.name());
-        let names = field.quantity().component_names();
-        let parts = fields::rank(field.name()).map_or(0, |rank| rank.components(dimension).len());
-        match component {
-            Some(k) => columns.push((format!("{base}.{}", names[k]), field.unit(), field, k)),
-            None if parts == 0 => columns.push((base, field.unit(), field, 0)),
-            None => columns.extend(
-                names
-                    .iter()
-                    .take(parts)
-                    .enumerate()
-                    .map(|(k, name)| (format!("{base}.{name}"), field.unit(), field, k)),
-            ),
+        let Field { unit, rank, .. } = field.facts();
+        let names = rank.components(3);
+        let parts = match component {
+            Some(k) => k..k + 1,
+            None => 0..rank.components(dimension).len(),
+        };
+        if parts.is_empty() {
+            columns.push((base, unit, field, 0));
+        } else {
+            columns.extend(parts.map(|k| (format!("{base}.{}", names[k]), unit, field, k)));
         }
     }
     Ok(columns)

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 
+use crate::deck::fields::PointField;
 use crate::deck::model::{Verify, VerifyNorm};
 use crate::error::Result;
 use crate::loads::manufactured::Manufactured;
 use crate::loads::scope_of;
 use crate::material::{Material, local};
-use crate::output::series::point_field::PointField;
 use crate::parallel::World;
 use crate::points::Points;
 

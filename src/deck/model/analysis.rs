@@ -1,15 +1,6 @@
 //! `[analysis]` and `[element_test]`.
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AnalysisType {
-    QuasiStatic,
-    Explicit,
-    ImplicitDynamic,
-    Conditioning,
-    /// Quasi-static, then with less and less strength.
-    StrengthReduction,
-    ElementTest,
-}
+use crate::deck::choices::choices;
 
 impl AnalysisType {
     /// Whether forces are in balance at the end of every step.
@@ -54,28 +45,6 @@ impl ElementTest {
     }
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ElementPath {
-    TriaxialDrained,
-    TriaxialUndrained,
-    Oedometer,
-    Isotropic,
-    SimpleShear,
-    Biaxial,
-    Strain,
-}
-
-/// What a problem in two dimensions stands for.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Symmetry {
-    /// A slice of unit thickness that cannot stretch along z.
-    #[default]
-    PlaneStrain,
-    /// Half of a section through a body of revolution: x is the radius, y the axis. Volumes, masses,
-    /// forces and energies are those of the whole turn.
-    Axisymmetric,
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct Analysis {
     pub kind: AnalysisType,
@@ -114,23 +83,53 @@ pub struct Damping {
     pub mass: f64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OnFailure {
-    Stop,
-    Cut,
-}
+choices! {
+    AnalysisType {
+        QuasiStatic = "quasi-static",
+        Explicit = "explicit",
+        ImplicitDynamic = "implicit-dynamic",
+        Conditioning = "conditioning",
+        /// Quasi-static, then with less and less strength.
+        StrengthReduction = "strength-reduction",
+        ElementTest = "element-test",
+    }
 
-/// How the tangent of implicit steps is kept and solved with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tangent {
-    /// As symmetric where all materials and loads have a symmetric one.
-    Auto,
-    /// As unsymmetric, whatever they say.
-    Unsymmetric,
-}
+    ElementPath {
+        TriaxialDrained = "triaxial-drained",
+        TriaxialUndrained = "triaxial-undrained",
+        Oedometer = "oedometer",
+        Isotropic = "isotropic",
+        SimpleShear = "simple-shear",
+        Biaxial = "biaxial",
+        Strain = "strain",
+    }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum InvertedIterates {
-    Reject,
-    Allow,
+    /// What a problem in two dimensions stands for.
+    #[derive(Default)]
+    Symmetry {
+        /// A slice of unit thickness that cannot stretch along z.
+        #[default]
+        PlaneStrain = "plane-strain",
+        /// Half of a section through a body of revolution: x is the radius, y the axis. Volumes, masses,
+        /// forces and energies are those of the whole turn.
+        Axisymmetric = "axisymmetric",
+    }
+
+    OnFailure {
+        Stop = "stop",
+        Cut = "cut",
+    }
+
+    /// How the tangent of implicit steps is kept and solved with.
+    Tangent {
+        /// As symmetric where all materials and loads have a symmetric one.
+        Auto = "auto",
+        /// As unsymmetric, whatever they say.
+        Unsymmetric = "unsymmetric",
+    }
+
+    InvertedIterates {
+        Reject = "reject",
+        Allow = "allow",
+    }
 }

@@ -1,5 +1,6 @@
 //! `[[boundary]]`: nodes of the grid, and surfaces off it.
 
+use crate::deck::choices::choices;
 use crate::deck::expression::Expression;
 use crate::deck::stage::Presence;
 
@@ -73,13 +74,6 @@ pub struct Support {
     pub method: SupportMethod,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SupportMethod {
-    Penalty,
-    /// The material's own traction, and a penalty for what is left.
-    Nitsche,
-}
-
 /// What a [`Support`] holds.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Held {
@@ -99,4 +93,12 @@ pub struct BodySurface {
     pub side: Option<(usize, bool)>,
     /// Condition on x, y, z at the start; `None`: everywhere.
     pub within: Option<Expression>,
+}
+
+choices! {
+    SupportMethod {
+        Penalty = "penalty",
+        /// The material's own traction, and a penalty for what is left.
+        Nitsche = "nitsche",
+    }
 }

@@ -1,5 +1,6 @@
 //! `[grid]`.
 
+use crate::deck::choices::choices;
 use std::path::PathBuf;
 
 use super::stations::Station;
@@ -50,14 +51,6 @@ pub enum MeshSource {
     },
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Element {
-    Tri3,
-    Quad4,
-    Tet4,
-    Hex8,
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub enum MeshMotion {
     Fixed,
@@ -67,4 +60,13 @@ pub enum MeshMotion {
     Follow(Vec<usize>),
     /// Nodes follow the material wholly: updated-Lagrangian FEM with `gauss` seeding.
     Material,
+}
+
+choices! {
+    Element {
+        Quad4 = "quad4",
+        Tri3 = "tri3",
+        Hex8 = "hex8",
+        Tet4 = "tet4",
+    }
 }

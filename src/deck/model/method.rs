@@ -1,5 +1,7 @@
 //! `[method]` and `[ghost]`.
 
+use crate::deck::choices::choices;
+
 pub use crate::basis::Declared as Basis;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -22,84 +24,6 @@ pub struct Method {
     /// A node whose summed basis weight is below this fraction of the largest one is held at
     /// zero and left out of the residual (default 1e-8 without Ghost stiffness, 0 with it).
     pub drop_below: f64,
-}
-
-/// Which of the two a point keeps while it moves: see [`crate::transfer::affine`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AffineTransfer {
-    /// Its affine moment: the angular momentum.
-    Apic,
-    /// Its velocity gradient: a rigid rotation.
-    Tpic,
-}
-
-/// How a GIMP domain follows the deformation (Lagrangian §6.4).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum DomainUpdate {
-    None,
-    Det,
-    Normal,
-    Stretch,
-    Corners,
-    NormalCorrected,
-    NormalIncremental,
-}
-
-/// What stresses are integrated over: the two differ where a domain's size does not follow det F.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum PointVolume {
-    /// det F V0
-    #[default]
-    Deformation,
-    /// That of the GIMP domain, as in the program behind Lagrangian §7.
-    Domain,
-}
-
-/// What keeps points from locking where the volume can hardly change.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Locking {
-    #[default]
-    None,
-    /// Stress from dF_bar = (det dF_0 / det dF)^(1/n) dF, dF_0 that of the cells.
-    FBar,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Frame {
-    Previous,
-    Updated,
-    Total,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Mass {
-    Consistent,
-    Lumped,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum StressUpdate {
-    Usf,
-    Usl,
-    Musl,
-}
-
-/// Functions of a GIMP domain that sticks out of the grid.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GimpEdge {
-    /// The functions of the outer cell go on beyond the edge, and their sum stays one.
-    Continued,
-    /// Hats of the grid's own nodes alone: what a node beyond the edge would hold is lost.
-    Published,
-}
-
-/// What moves the points of an explicit step with a Ghost mass.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum PositionUpdate {
-    /// The velocity that keeps the angular momentum.
-    Momentum,
-    /// The updated nodal velocity (Ghost eq. 9).
-    Published,
 }
 
 /// Ghost stabilisation parameters. Absolute values win over factors.
@@ -126,10 +50,82 @@ impl Ghost {
     pub const IMPLICIT_MASS_FACTOR: f64 = 0.01;
 }
 
-/// Scale of the face matrix: numerics of the default and of the papers' tables differ.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum GhostScaling {
-    ScaleFree,
-    Literal,
-    Published,
+choices! {
+    /// Which of the two a point keeps while it moves: see [`crate::transfer::affine`].
+    AffineTransfer {
+        /// Its affine moment: the angular momentum.
+        Apic = "apic",
+        /// Its velocity gradient: a rigid rotation.
+        Tpic = "tpic",
+    }
+
+    /// How a GIMP domain follows the deformation (Lagrangian §6.4).
+    DomainUpdate {
+        None = "none",
+        Det = "det",
+        Normal = "normal",
+        Stretch = "stretch",
+        Corners = "corners",
+        NormalCorrected = "normal-corrected",
+        NormalIncremental = "normal-incremental",
+    }
+
+    /// What stresses are integrated over: the two differ where a domain's size does not follow det F.
+    #[derive(Default)]
+    PointVolume {
+        /// det F V0
+        #[default]
+        Deformation = "deformation",
+        /// That of the GIMP domain, as in the program behind Lagrangian §7.
+        Domain = "domain",
+    }
+
+    /// What keeps points from locking where the volume can hardly change.
+    #[derive(Default)]
+    Locking {
+        #[default]
+        None = "none",
+        /// Stress from dF_bar = (det dF_0 / det dF)^(1/n) dF, dF_0 that of the cells.
+        FBar = "f-bar",
+    }
+
+    Frame {
+        Previous = "previous",
+        Updated = "updated",
+        Total = "total",
+    }
+
+    Mass {
+        Consistent = "consistent",
+        Lumped = "lumped",
+    }
+
+    StressUpdate {
+        Usf = "usf",
+        Usl = "usl",
+        Musl = "musl",
+    }
+
+    /// Functions of a GIMP domain that sticks out of the grid.
+    GimpEdge {
+        /// The functions of the outer cell go on beyond the edge, and their sum stays one.
+        Continued = "continued",
+        /// Hats of the grid's own nodes alone: what a node beyond the edge would hold is lost.
+        Published = "published",
+    }
+
+    /// What moves the points of an explicit step with a Ghost mass.
+    PositionUpdate {
+        /// The velocity that keeps the angular momentum.
+        Momentum = "momentum",
+        /// The updated nodal velocity (Ghost eq. 9).
+        Published = "published",
+    }
+
+    /// Scale of the face matrix: numerics of the default and of the papers' tables differ.
+    GhostScaling {
+        ScaleFree = "scale-free",
+        Literal = "literal",
+        Published = "published",
+    }
 }

@@ -1,5 +1,6 @@
 //! `[[verify]]`, `[[probe]]`, `[output]` and `[parallel]`.
 
+use crate::deck::choices::choices;
 use crate::deck::expression::Expression;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -33,27 +34,6 @@ pub enum Spot {
     Id(u64),
     /// The mean over a body.
     Mean(usize),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum VerifyNorm {
-    /// sum |a - b| V0 / (scale V0_total), Lagrangian eq. 42.
-    VolumeL1,
-    /// sqrt(sum |a - b|^2 V0 / V0_total) / scale
-    VolumeL2,
-    /// max |a - b| / scale
-    Max,
-}
-
-/// Readers of frames.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Format {
-    /// XDMF beside the HDF5 files.
-    Xdmf,
-    /// The HDF5 files of the points are VTKHDF files as well.
-    VtkHdf,
-    /// VTK files of the points, too.
-    Vtu,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -90,23 +70,6 @@ pub struct Checkpoint {
     pub keep: usize,
 }
 
-/// How the first partition is made.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Initial {
-    Balanced,
-    /// Equal slices of the grid, for comparison.
-    Slabs,
-}
-
-/// What a point costs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cost {
-    /// One: partitions, and so results, repeat bit by bit.
-    Points,
-    /// The seconds that its rank spends, smoothed: follows uneven machines and materials.
-    Time,
-}
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Parallel {
     pub initial: Initial,
@@ -116,4 +79,40 @@ pub struct Parallel {
     pub brick: Option<usize>,
     /// Repartition when max/mean cost exceeds this (default 1.1); 0 switches it off.
     pub rebalance_above: f64,
+}
+
+choices! {
+    VerifyNorm {
+        /// sum |a - b| V0 / (scale V0_total), Lagrangian eq. 42.
+        VolumeL1 = "volume-l1",
+        /// sqrt(sum |a - b|^2 V0 / V0_total) / scale
+        VolumeL2 = "volume-l2",
+        /// max |a - b| / scale
+        Max = "max",
+    }
+
+    /// Readers of frames.
+    Format {
+        /// XDMF beside the HDF5 files.
+        Xdmf = "xdmf",
+        /// The HDF5 files of the points are VTKHDF files as well.
+        VtkHdf = "vtkhdf",
+        /// VTK files of the points, too.
+        Vtu = "vtu",
+    }
+
+    /// How the first partition is made.
+    Initial {
+        Balanced = "balanced",
+        /// Equal slices of the grid, for comparison.
+        Slabs = "slabs",
+    }
+
+    /// What a point costs.
+    Cost {
+        /// One: partitions, and so results, repeat bit by bit.
+        Points = "points",
+        /// The seconds that its rank spends, smoothed: follows uneven machines and materials.
+        Time = "time",
+    }
 }

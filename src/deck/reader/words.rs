@@ -65,6 +65,21 @@ impl Table<'_> {
         self.present(name, at)
     }
 
+    /// One of some names of the deck: its place among them.
+    pub fn choice_of_names(&self, name: &str, names: &[String]) -> Got<usize> {
+        let known: Vec<&str> = names.iter().map(String::as_str).collect();
+        self.choice_of(name, &known)
+    }
+
+    /// Enters a name among those before it, whose bearer is a `what`.
+    pub fn unique(&self, name: String, names: &mut Vec<String>, what: &str) -> Got<String> {
+        if names.contains(&name) {
+            return Err(self.problem("name", format!("another {what} is called \"{name}\"")));
+        }
+        names.push(name.clone());
+        Ok(name)
+    }
+
     /// Positions in `allowed` of the words of an array, without repeats.
     pub fn choices(&self, name: &str, allowed: &[&str]) -> Got<Vec<usize>> {
         let found = self.read(name, |key, node| {

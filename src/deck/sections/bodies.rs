@@ -57,7 +57,7 @@ pub fn bodies(root: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Vec<Body>>
             table.problem("name", format!("another body is called \"{}\"", names[index]));
         }
         table.text_if("name")?;
-        let material = material(&table, &materials);
+        let material = table.choice_of_names("material", &materials);
         let density = density(&table, earlier);
         let velocity = table.expressions_if("velocity", earlier.dimension);
         let overlap = table.choice_of("overlap", &["refuse", "allow"]);
@@ -81,15 +81,6 @@ pub fn bodies(root: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<Vec<Body>>
         return Err(root.missing("body", "expected a [[body]]"));
     }
     Ok(bodies)
-}
-
-fn material(table: &Table<'_>, materials: &[String]) -> Got<usize> {
-    let name = table.text("material")?;
-    let known: Vec<&str> = materials.iter().map(String::as_str).collect();
-    known
-        .iter()
-        .position(|material| *material == name)
-        .ok_or_else(|| table.unknown_word("material", &name, &known, table.origin("material")))
 }
 
 fn density(table: &Table<'_>, earlier: &EarlierSections<'_>) -> Got<f64> {

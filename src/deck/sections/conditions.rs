@@ -26,10 +26,7 @@ pub fn boundaries(
     let mut names: Vec<String> = Vec::new();
     root.tables("boundary", |index, table| {
         let name = table.text_if("name")?.unwrap_or_else(|| format!("boundary-{}", index + 1));
-        if names.contains(&name) {
-            return Err(table.problem("name", format!("another boundary is called \"{name}\"")));
-        }
-        names.push(name.clone());
+        let name = table.unique(name, &mut names, "boundary")?;
         let axes = &AXES[..earlier.dimension];
         let place = match table.one_of(&["where", "surface"])? {
             "where" => table.table("where", |t| place(&t, earlier, bodies)),
@@ -159,18 +156,8 @@ fn place(table: &Table<'_>, earlier: &EarlierSections<'_>, bodies: &[String]) ->
             }
             Err(table.unknown_word("tag", &tag, known, table.origin("tag")))
         }
-        _ => Ok(Place::CellsOf { body: body(table, "cells_of", bodies)? }),
+        _ => Ok(Place::CellsOf { body: table.choice_of_names("cells_of", bodies)? }),
     }
-}
-
-/// Index of the body named by a key.
-fn body(table: &Table<'_>, key: &'static str, bodies: &[String]) -> Got<usize> {
-    let name = table.text(key)?;
-    let known: Vec<&str> = bodies.iter().map(String::as_str).collect();
-    known
-        .iter()
-        .position(|body| *body == name)
-        .ok_or_else(|| table.unknown_word(key, &name, &known, table.origin(key)))
 }
 
 /// The body that key `body` names, or the only one.
@@ -178,7 +165,7 @@ pub fn of_body(table: &Table<'_>, names: &[String]) -> Got<usize> {
     match (table.given("body"), names) {
         (false, [_]) => Ok(0),
         (false, _) => Err(table.missing("body", "the deck has several bodies")),
-        (true, _) => body(table, "body", names),
+        (true, _) => table.choice_of_names("body", names),
     }
 }
 

@@ -47,11 +47,7 @@ pub fn rigids(
         boundaries.unwrap_or_default().iter().map(|boundary| boundary.name.clone()).collect();
     root.tables("rigid", |_, table| {
         let name = table.text("name")?;
-        if names.contains(&name) {
-            let message = format!("another boundary or rigid body is called \"{name}\"");
-            return Err(table.problem("name", message));
-        }
-        names.push(name.clone());
+        let name = table.unique(name, &mut names, "boundary or rigid body")?;
         let shape = table.table("shape", |t| shape(&t, directory, dimension));
         let motion = table.table_if("motion", |t| motion(&t, dimension));
         let (density, velocity) =
@@ -192,10 +188,7 @@ pub fn contacts(
             of_two_bodies(&table, analysis, method)?;
         }
         let name = table.text_if("name")?.unwrap_or(joined);
-        if names.contains(&name) {
-            return Err(table.problem("name", format!("another contact is called \"{name}\"")));
-        }
-        names.push(name.clone());
+        let name = table.unique(name, &mut names, "contact")?;
         let (friction, adhesion, max_shear, presence) = (friction?, adhesion?, most?, presence?);
         if let (Partner::Rigid(rigid), Some(rigids)) = (partner, rigids)
             && rigids[rigid].presence.together(&presence).is_none()

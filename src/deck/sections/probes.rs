@@ -13,11 +13,7 @@ pub fn probes(root: &Table<'_>, dimension: usize, bodies: &[String]) -> Got<Vec<
         let name = table.text("name");
         let spot = spot(&table, dimension, bodies);
         let fields = selectors(&table, dimension);
-        let name = name?;
-        if names.contains(&name) {
-            return Err(table.problem("name", format!("another probe is called \"{name}\"")));
-        }
-        names.push(name.clone());
+        let name = table.unique(name?, &mut names, "probe")?;
         Ok(Probe { name, spot: spot?, fields: fields? })
     })
 }
@@ -25,15 +21,9 @@ pub fn probes(root: &Table<'_>, dimension: usize, bodies: &[String]) -> Got<Vec<
 fn spot(table: &Table<'_>, dimension: usize, bodies: &[String]) -> Got<Spot> {
     let near = table.vector_if("near", dimension);
     let id = table.count_if("id");
-    let body = match table.text_if("body")? {
-        None => None,
-        Some(word) => match bodies.iter().position(|body| *body == word) {
-            Some(at) => Some(at),
-            None => {
-                let known: Vec<&str> = bodies.iter().map(String::as_str).collect();
-                return Err(table.unknown_word("body", &word, &known, table.origin("body")));
-            }
-        },
+    let body = match table.given("body") {
+        true => Some(table.choice_of_names("body", bodies)?),
+        false => None,
     };
     match (near?, id?, body) {
         (Some(place), None, body) => Ok(Spot::Near { place, body }),

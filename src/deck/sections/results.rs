@@ -18,12 +18,7 @@ pub fn verify(root: &Table<'_>, dimension: usize) -> Got<Vec<Verify>> {
         let scale = table.number("scale");
         let (field, components) = components?;
         let exact = exact(&table, &field, components);
-        let name = name?;
-        if names.contains(&name) {
-            let message = format!("another figure of merit is called \"{name}\"");
-            return Err(table.problem("name", message));
-        }
-        names.push(name.clone());
+        let name = table.unique(name?, &mut names, "figure of merit")?;
         Ok(Verify { name, field, exact: exact?, norm: norm?, scale: scale? })
     })
 }

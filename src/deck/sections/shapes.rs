@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
+use crate::deck::expression::Expression;
 use crate::deck::problems::{Got, figure};
 use crate::deck::reader::Table;
 use crate::deck::schema;
@@ -89,20 +90,15 @@ fn form(
                 .and_then(|triangles| Solid::new(&path, Some(bottom), triangles));
             solid(&t, "file", &path, made).map(Form::Solid)
         }),
-        "where" => {
-            let variables = if dimension == 2 { "x y X Y" } else { "x y z X Y Z" };
-            let condition = table.formula("where", variables)?;
-            match condition.as_constant() {
-                None => Ok(Form::Where(condition)),
-                Some(_) => Err(table.problem(
-                    "where",
-                    "expected a condition on x and y, such as \"x*x + y < 1\", found a constant",
-                )),
-            }
+        "where" => condition(table, dimension).map(Form::Where),
+        _ => {
+            let parts = shapes(table, name, directory, dimension, depth)?;
+            Ok(match name {
+                "union" => Form::Union(parts),
+                "intersection" => Form::Intersection(parts),
+                _ => Form::Difference(parts),
+            })
         }
-        "union" => Ok(Form::Union(shapes(table, name, directory, dimension, depth)?)),
-        "intersection" => Ok(Form::Intersection(shapes(table, name, directory, dimension, depth)?)),
-        _ => Ok(Form::Difference(shapes(table, name, directory, dimension, depth)?)),
     }
 }
 
@@ -205,6 +201,17 @@ fn shapes(
         })
         .collect();
     all.into_iter().collect()
+}
+
+/// A condition on the place.
+pub fn condition(table: &Table<'_>, dimension: usize) -> Got<Expression> {
+    let variables = if dimension == 2 { "x y X Y" } else { "x y z X Y Z" };
+    let condition = table.formula("where", variables)?;
+    if condition.as_constant().is_some() {
+        let what = "expected a condition on x and y, such as \"x*x + y < 1\", found a constant";
+        return Err(table.problem("where", what));
+    }
+    Ok(condition)
 }
 
 fn placement(table: &Table<'_>, dimension: usize) -> Got<Placement> {

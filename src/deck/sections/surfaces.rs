@@ -1,7 +1,7 @@
 //! Surfaces of bodies, and what lies on a line or plane: where supports and tractions act.
 
 use super::conditions::of_body;
-use crate::deck::expression::Expression;
+use super::shapes;
 use crate::deck::model::{Body, BodySource, BodySurface, Held};
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
@@ -64,7 +64,7 @@ pub fn body_surface(
         false => Ok(None),
     };
     let within = match table.given("where") {
-        true => condition(table, dimension).map(Some),
+        true => shapes::condition(table, dimension).map(Some),
         false => Ok(None),
     };
     let (body, side, within) = (body?, side?, within?);
@@ -89,14 +89,4 @@ pub fn body_surface(
             Err(table.problem_with_help(key, what, help))
         }
     }
-}
-
-fn condition(table: &Table<'_>, dimension: usize) -> Got<Expression> {
-    let variables = if dimension == 2 { "x y X Y" } else { "x y z X Y Z" };
-    let condition = table.formula("where", variables)?;
-    if condition.as_constant().is_some() {
-        let what = "expected a condition on x and y, such as \"x*x + y < 1\", found a constant";
-        return Err(table.problem("where", what));
-    }
-    Ok(condition)
 }

@@ -9,150 +9,14 @@
 use nalgebra::Matrix3;
 
 use crate::contact::point_state;
-use crate::deck::fields::{self, FieldRank};
+use crate::deck::fields::{self, PointField};
+use crate::deck::nearest;
 use crate::error::{Error, Result};
-use crate::material::{StateVariable, state_variables};
 use crate::points::Points;
 use crate::tensor::Spectrum;
 use crate::tensor::spectral::ln_1p;
 
-/// Shape of a field's value at one point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Quantity {
-    /// Whole number, one column of `i64`.
-    Integer,
-    Scalar,
-    /// x, y, z; z is zero in plane strain.
-    Vector,
-    /// 00, 01, 02, 11, 12, 22
-    Tensor6,
-    /// Row by row: 00, 01, 02, 10, ...
-    Tensor9,
-    /// Three principal values, the largest first.
-    Principal,
-}
-
-impl Quantity {
-    pub fn columns(self) -> usize {
-        match self {
-            Quantity::Integer | Quantity::Scalar => 1,
-            Quantity::Vector | Quantity::Principal => 3,
-            Quantity::Tensor6 => 6,
-            Quantity::Tensor9 => 9,
-        }
-    }
-
-    /// The words after the dot in `stress.yy`, in column order.
-    pub fn component_names(self) -> &'static [&'static str] {
-        match self {
-            Quantity::Integer | Quantity::Scalar => &[],
-            Quantity::Vector => &["x", "y", "z"],
-            Quantity::Tensor6 => &["xx", "xy", "xz", "yy", "yz", "zz"],
-            Quantity::Tensor9 => &["xx", "xy", "xz", "yx", "yy", "yz", "zx", "zy", "zz"],
-            Quantity::Principal => &["1", "2", "3"],
-        }
-    }
-}
-
-macro_rules! point_field_table {
-    ($( $variant:ident $name:literal ),* $(,)?) => {
-        /// A field of the material points, named as in `output.fields`.
-        #[derive(Debug, Clone, Copy, PartialEq)]
-        pub enum PointField {
-            $( #[doc = concat!("`", $name, "` of [`FIELDS`](crate::deck::fields::FIELDS)")] $variant, )*
-            /// A state variable of a material; zero where a point's material does not have it.
-            State(StateVariable),
-        }
-
-        impl PointField {
-            /// All but the state variables.
-            pub const ALL: &'static [PointField] = &[$( PointField::$variant ),*];
-
-            pub fn name(self) -> &'static str {
-                match self {
-                    $( PointField::$variant => $name, )*
-                    PointField::State(variable) => variable.name,
-                }
-            }
-        }
-    };
-}
-
-point_field_table! {
-    Displacement "displacement",
-    Position "position",
-    PositionInitial "position_initial",
-    Velocity "velocity",
-    Acceleration "acceleration",
-    Stress "stress",
-    EffectiveStress "effective_stress",
-    PorePressure "pore_pressure",
-    KirchhoffStress "kirchhoff_stress",
-    PrincipalStress "principal_stress",
-    Pressure "pressure",
-    MeanStress "p",
-    Deviator "q",
-    VonMises "von_mises",
-    MobilisedFriction "mobilised_friction",
-    DeviatoricRadius "deviatoric_radius",
-    LogStrain "log_strain",
-    VolumetricStrain "volumetric_strain",
-    EquivalentStrain "equivalent_strain",
-    PlasticStrain "plastic_strain",
-    Dissipation "dissipation",
-    DeformationGradient "deformation_gradient",
-    ElasticLeftCauchyGreen "elastic_left_cauchy_green",
-    Jacobian "J",
-    Volume "volume",
-    Mass "mass",
-    HalfLength "half_length",
-    PointForce "point_force",
-    ContactForce "contact_force",
-    ContactGap "contact_gap",
-    ContactSlip "contact_slip",
-    ContactStatus "contact_status",
-    Id "id",
-    Body "body",
-    Rank "rank",
-}
-
 impl PointField {
-    pub fn quantity(self) -> Quantity {
-        let PointField::State(_) = self else {
-            return match fields::known(self.name()).rank {
-                FieldRank::Integer => Quantity::Integer,
-                FieldRank::Scalar => Quantity::Scalar,
-                FieldRank::Vector => Quantity::Vector,
-                FieldRank::Symmetric => Quantity::Tensor6,
-                FieldRank::Tensor => Quantity::Tensor9,
-                FieldRank::Principal => Quantity::Principal,
-            };
-        };
-        Quantity::Scalar
-    }
-
-    /// SI unit.
-    pub fn unit(self) -> &'static str {
-        match self {
-            PointField::State(variable) => variable.unit,
-            field => fields::known(field.name()).unit,
-        }
-    }
-
-    /// What it is, in a few words.
-    pub fn description(self) -> &'static str {
-        match self {
-            PointField::State(_) => "State variable of a material",
-            field => fields::known(field.name()).doc,
-        }
-    }
-
-    pub fn from_name(name: &str) -> Option<Self> {
-        let of_points = Self::ALL.iter().copied();
-        let of_materials = state_variables().into_iter().map(PointField::State);
-        of_points.chain(of_materials).find(|field| field.name() == name)
-    }
-
     /// The fields of `output.fields`.
     ///
     /// # Errors
@@ -169,7 +33,7 @@ impl PointField {
         };
         let field = Self::from_name(name).ok_or_else(|| unknown(name))?;
         let Some(component) = component else { return Ok((field, None)) };
-        let known = field.quantity().component_names();
+        let known = field.facts().rank.components(3);
         match known.iter().position(|&word| word == component) {
             Some(index) => Ok((field, Some(index))),
             None if known.is_empty() => Err(Error::Input(format!(
@@ -182,7 +46,7 @@ impl PointField {
         }
     }
 
-    /// Appends the columns of this field at point `p`; integers of [`Quantity::Integer`] fields
+    /// Appends the columns of this field at point `p`; integers of [`FieldRank::Integer`] fields
     /// come from [`PointField::integer`] instead and appear here rounded to `f64`.
     pub fn append<const D: usize>(self, points: &Points<D>, p: usize, out: &mut Vec<f64>) {
         let jacobian = || points.deformation_gradient[p].determinant();
@@ -324,16 +188,10 @@ impl LogStrain {
 }
 
 fn unknown(name: &str) -> Error {
-    let nearest = PointField::ALL
-        .iter()
-        .map(|field| field.name())
-        .max_by(|a, b| strsim::jaro_winkler(a, name).total_cmp(&strsim::jaro_winkler(b, name)))
-        .unwrap_or_default();
-    let all: Vec<_> = PointField::ALL.iter().map(|field| field.name()).collect();
-    Error::Input(format!(
-        "unknown point field `{name}`: did you mean `{nearest}`? Known are {}",
-        all.join(", ")
-    ))
+    let known = fields::names();
+    let near = nearest(name, known.iter().copied());
+    let near = near.map_or(";".into(), |near| format!(": did you mean `{near}`?"));
+    Error::Input(format!("unknown point field `{name}`{near} known are {}", known.join(", ")))
 }
 
 #[cfg(test)]
@@ -343,7 +201,7 @@ mod tests {
     fn values(points: &Points<2>, field: PointField) -> Vec<f64> {
         let mut out = Vec::new();
         field.append(points, 0, &mut out);
-        assert_eq!(out.len(), field.quantity().columns(), "{}", field.name());
+        assert_eq!(out.len(), field.facts().rank.columns(), "{}", field.name());
         out
     }
 

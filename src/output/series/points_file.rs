@@ -6,7 +6,7 @@ use mpi::topology::{Communicator, SimpleCommunicator};
 use super::domains;
 use super::frame::{Array, Frame, Number, Topology, Values};
 use super::frame_series::{Series, StepTime};
-use super::point_field::{PointField, Quantity};
+use crate::deck::fields::{FieldRank, PointField};
 use crate::deck::model::{Basis, Format};
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
@@ -109,8 +109,8 @@ impl PointsSeries {
 }
 
 fn array_of<'a, const D: usize>(field: PointField, points: &'a Points<D>, rank: i32) -> Array<'a> {
-    let (count, columns) = (points.len(), field.quantity().columns());
-    let integer = field.quantity() == Quantity::Integer;
+    let (count, facts) = (points.len(), field.facts());
+    let (integer, columns) = (facts.rank == FieldRank::Integer, facts.rank.columns());
     let values = move || {
         if integer {
             let values = (0..count).filter_map(|p| field.integer(points, p, rank));
@@ -121,9 +121,9 @@ fn array_of<'a, const D: usize>(field: PointField, points: &'a Points<D>, rank: 
         Values::Floats(values)
     };
     let number = if integer { Number::Integer } else { Number::Float };
-    let components = field.quantity().component_names();
-    let array = Array { columns, components, ..Array::new(field.name(), number, values) };
-    array.described(field.unit(), field.description())
+    let components = facts.rank.components(3);
+    let array = Array { columns, components, ..Array::new(facts.name, number, values) };
+    array.described(facts.unit, facts.doc)
 }
 
 fn with_always(fields: &[PointField]) -> Vec<PointField> {

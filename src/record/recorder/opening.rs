@@ -1,12 +1,12 @@
 //! The files of a run, fresh or continued.
 
 use crate::deck::Deck;
+use crate::deck::fields::PointField;
 use crate::deck::model::{AnalysisType, Every, Format, Symmetry};
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
 use crate::output::restart::run_state::RunState;
 use crate::output::series::frame_series::Series;
-use crate::output::series::point_field::PointField;
 use crate::output::series::points_file::PointsSeries;
 use crate::output::summary::Count;
 use crate::output::tables::csv_table::Mark;
