@@ -169,11 +169,6 @@ fn with_hardening_a_slope_that_flows_takes_the_iterations_of_an_elastic_one() {
             vec![poisson.to_string(), dilation.to_string(), (hardening / 1e6).to_string()];
         let mut over = Vec::new();
         for h in [0.5, 0.25, 0.125, 0.0625] {
-            // Steps of hundreds of iterations.
-            if h < 0.1 && poisson == 0.3 && hardening == 0.0 {
-                row.push(String::new());
-                continue;
-            }
             let results = soil.run(h).ranks(2).results();
             let [elastic, flow] = iterations_of(&results);
             let [share, least] = soil.least_eigenvalue(h, &results);
@@ -224,6 +219,22 @@ fn a_slope_takes_the_same_iterations_on_all_ranks_and_nearly_so_anywhere_on_the_
     }
 }
 
+/// Over smaller cells, with the solver's defaults: the nodes that flow at the toe are solved together, and levels are made anew
+/// where all soil begins to flow. Without the first the iterations of flow at the toe are 14.2, 15.0, 17.5, 22.2 over h / 8, without the
+/// second those of all soil are 16.2, 18.3, 32.3 over h / 4.
+#[test]
+fn iterations_in_flow_are_flat_over_cells() {
+    let flow = |change: &dyn Fn(Run) -> Run| {
+        [0.5, 0.25, 0.125].map(|h| iterations(&change(slope(h, 0.02)).ranks(2))[1])
+    };
+    let toe = flow(&|run| run);
+    let all = flow(&|run| run.set("material.soil.poisson=0.3"));
+    for (counts, most) in [(toe, 0.12), (all, 0.25)] {
+        let mean = counts.iter().sum::<f64>() / 3.0;
+        assert!(counts.iter().all(|count| (count / mean - 1.0).abs() < most), "{counts:?}");
+    }
+}
+
 /// A preconditioner that the user names alone gets an iteration around it on a small system, and factors that
 /// the user asks for on a large one are those of the iterate.
 #[test]
@@ -253,9 +264,16 @@ fn iterations_on_slopes_that_flow() {
     for h in [0.5, 0.25, 0.125, 0.0625] {
         let of = |change: &dyn Fn(Run) -> Run| text(iterations(&change(slope(h, 0.02)).ranks(2)));
         let mut row = vec![h.to_string(), of(&|run| run), of(&off), of(&bar)];
-        // The finest one takes minutes for steps of hundreds of iterations.
-        row.push(if h < 0.1 { String::new() } else { of(&wide) });
+        row.push(of(&wide));
         rows.push(row);
+    }
+    for (column, most) in [(1, 0.15), (2, 0.15), (3, 0.15), (4, 0.25)] {
+        let flow: Vec<f64> = rows
+            .iter()
+            .map(|row: &Vec<String>| row[column].split(' ').next_back().unwrap().parse().unwrap())
+            .collect();
+        let mean = flow.iter().sum::<f64>() / flow.len() as f64;
+        assert!(flow.iter().all(|count| (count / mean - 1.0).abs() < most), "{column}: {flow:?}");
     }
     let header = ["h [m]", "Ghost", "off", "Ghost, F-bar", "all soil flows"];
     record_in("unsymmetric.md", "slope-cells", &header, &rows);

@@ -6,6 +6,7 @@
 //! (A + A^T) / 2 but for the products of the finest one, which are A's ([`super`] has the exception): docs/evidence/unsymmetric.md.
 
 use super::block_smoother::BlockSmoother;
+use super::flow::Flow;
 use crate::blocks::BlockProduct;
 use crate::error::{Error, Result};
 use crate::petsc::abort::unless_shared;
@@ -21,6 +22,8 @@ pub struct Hierarchy {
     pub levels: Vec<Smoothed>,
     /// The last.
     pub coarsest: CoarsestRows,
+    /// Share of the nodes that flow, where the finest smoother knows them.
+    pub flow: Option<f64>,
 }
 
 /// A level with a smoother.
@@ -31,8 +34,8 @@ pub struct Smoothed {
     pub largest: f64,
     /// P, from the next level to this one.
     pub transfer: BlockProduct<f32>,
-    /// What stands in the place of D where penalties tie nodes.
-    pub tied: Option<BlockSmoother>,
+    /// What stands in the place of D where nodes are solved together.
+    pub smoother: Option<BlockSmoother>,
 }
 
 /// This rank's rows of the last level, compressed: global columns, ascending.
@@ -65,9 +68,20 @@ pub trait Levelled {
         finest: &mut BlockProduct<f32>,
     ) -> Result<()>;
 
+    /// The nodes that flow by the values that the matrix has now; `None` where they do not matter. It is
+    /// asked after [`Self::hierarchy`] gave a share of them.
+    fn flow(&mut self, _matrix: &mut Matrix) -> Result<Option<Flow>> {
+        Ok(None)
+    }
+
     /// Gives the smoother of the finest level the values that the matrix has now, where
-    /// [`Self::hierarchy`] made one with a block of tied nodes.
-    fn tie(&mut self, _matrix: &mut Matrix, _smoother: &mut BlockSmoother) -> Result<()> {
+    /// [`Self::hierarchy`] made one that solves nodes together; `flow`: of [`Self::flow`].
+    fn follow(
+        &mut self,
+        _matrix: &mut Matrix,
+        _flow: Option<&Flow>,
+        _smoother: &mut BlockSmoother,
+    ) -> Result<()> {
         Ok(())
     }
 }
@@ -94,6 +108,8 @@ struct Installed {
     /// Iterations per digit of the first solve.
     pace: Option<f64>,
     slow: bool,
+    /// [`Hierarchy::flow`].
+    flow: Option<f64>,
 }
 
 impl Levels {
@@ -126,7 +142,14 @@ impl Levels {
             return Ok(());
         }
         let (kept, state) = (multigrid::is_kept(solver)?, matrix.state()?);
-        if !self.0.as_ref().is_some_and(|levels| levels.serves(state, kept)) {
+        let serving = self.0.as_ref().filter(|levels| levels.serves(state, kept));
+        let known = serving.filter(|levels| !levels.hold(state)).and_then(|levels| levels.flow);
+        let flow = match known {
+            Some(_) => agree(solver.comm(), problem.flow(matrix))?,
+            None => None,
+        };
+        let begins = flow.as_ref().zip(known).is_some_and(|(flow, then)| flow.has_changed(then));
+        if serving.is_none() || begins {
             let made = agree(solver.comm(), problem.hierarchy(matrix))?;
             let installed = made.map(|made| Installed::new(solver, state, made)).transpose();
             self.0 = installed.map_err(|error| unless_shared(solver.comm(), error))?;
@@ -138,7 +161,7 @@ impl Levels {
                 agree(solver.comm(), problem.fill(matrix, exact, finest))
             })?;
             multigrid::renew_finest_smoother(solver, |smoother: &mut BlockSmoother| {
-                agree(solver.comm(), problem.tie(matrix, smoother))
+                agree(solver.comm(), problem.follow(matrix, flow.as_ref(), smoother))
             })?;
         }
         multigrid::multiply_by(solver, &levels.exact, matrix)
@@ -158,11 +181,11 @@ impl Levels {
 impl Installed {
     /// Collective.
     fn new(solver: &Ksp, state: u64, hierarchy: Hierarchy) -> Result<Self> {
-        let Hierarchy { exact, levels, coarsest } = hierarchy;
+        let Hierarchy { exact, levels, coarsest, flow } = hierarchy;
         let comm = solver.comm();
         let mut smoothers = Vec::new();
-        let level = |Smoothed { product, largest, transfer, tied }| -> Result<_> {
-            smoothers.push(tied);
+        let level = |Smoothed { product, largest, transfer, smoother }| -> Result<_> {
+            smoothers.push(smoother);
             Ok(Level {
                 matrix: ProductMatrix::new(comm, product)?,
                 transfer: ProductMatrix::new(comm, transfer)?,
@@ -178,7 +201,7 @@ impl Installed {
         let coarsest = Matrix::from_csr(comm, block, rows, &offsets, &columns, &values)?;
         multigrid::install(solver, &levels, smoothers, &coarsest)?;
         let exact = ProductMatrix::new(comm, exact)?;
-        Ok(Installed { made: state, filled: state, exact, levels, pace: None, slow: false })
+        Ok(Installed { made: state, filled: state, exact, levels, pace: None, slow: false, flow })
     }
 
     /// Whether the levels shall serve for the matrix of `state`; `kept`: the user's lag says so.

@@ -14,10 +14,12 @@
 //! | levels under a solver | `cycle.rs` |
 //! | symmetric part of an unsymmetric system | `symmetric_part.rs` |
 //! | nodes that penalties tie | `tied.rs` |
-//! | their smoother | `block_smoother.rs` |
+//! | nodes that flow | `flow.rs` |
+//! | the smoother of both | `block_smoother.rs` |
 //!
 //! The levels are those of a symmetric matrix. Under an unsymmetric A they are made from
-//! (A + A^T) / 2; the iteration outside and the smoother of the finest level multiply by A. Where penalties
+//! (A + A^T) / 2; the iteration outside and the smoother of the finest level multiply by A, and the latter solves few
+//! nodes that flow together. Where penalties
 //! tie nodes, that smoother multiplies by the symmetric part, too.
 //!
 //! Whole blocks of a node are the unit throughout, each rank works on its own rows, and nothing
@@ -27,6 +29,7 @@
 pub(crate) mod aggregate;
 pub(crate) mod block_smoother;
 pub(crate) mod cycle;
+pub mod flow;
 pub(crate) mod galerkin;
 pub mod level;
 pub(crate) mod owners;
@@ -52,6 +55,8 @@ pub use block_smoother::BlockSmoother;
 pub use cycle::{CoarsestRows, Hierarchy, Levelled, Levels, Smoothed};
 
 use aggregate::Aggregates;
+use block_smoother::Cause;
+use flow::Flow;
 use galerkin::Coarse;
 use prolongator::{Lengths, Parts, Prolongator};
 use rigid::Modes;
@@ -191,15 +196,19 @@ pub fn build_unsymmetric<const K: usize, const C: usize>(
     fill(rows, &mut exact);
     let symmetric = surrogate_of(world, nodes, rows, ties)?;
     // Where penalties tie nodes, A has no definite symmetric part before it is corrected.
-    let rounded = match ties.are_there(world) {
-        true => product(nodes, &symmetric),
-        false => {
-            let mut rounded = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
-            fill(rows, &mut rounded);
-            rounded
-        }
-    };
-    levels::<K, C>(world, (nodes, &symmetric, &ties.nodes), exact, rounded)
+    if ties.are_there(world) {
+        let rounded = product(nodes, &symmetric);
+        return levels::<K, C>(world, (nodes, &symmetric, &ties.nodes), exact, rounded);
+    }
+    let mut rounded = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts, count);
+    fill(rows, &mut rounded);
+    let made = levels::<K, C>(world, (nodes, &symmetric, &[]), exact, rounded)?;
+    let Some(mut made) = made else { return Ok(None) };
+    let flow = Flow::of(world, nodes, rows, &symmetric);
+    // Its block leaves the largest eigenvalue where it is: of the block alone it is 1.
+    made.levels[0].smoother = Some(flow.smoother(world, nodes, rows)?);
+    made.flow = Some(flow.share);
+    Ok(Some(made))
 }
 
 /// The hierarchy with `exact` outside and `rounded` on the finest level; groups, transfers and coarse levels are those of the
@@ -222,7 +231,7 @@ fn levels<const K: usize, const C: usize>(
         levels.push(level);
         (coarse, length) = (coarser, coarser_length);
     }
-    Ok(Some(Hierarchy { exact, levels, coarsest: coarsest(&coarse) }))
+    Ok(Some(Hierarchy { exact, levels, coarsest: coarsest(&coarse), flow: None }))
 }
 
 /// One level, the next, and the latter's length of rotations (m). `None` where the next has too many
@@ -255,12 +264,12 @@ fn coarsen<const K: usize, const C: usize>(
     let prolongator = Prolongator::<K, C>::smoothed(world, rows, &parts)?;
     let coarse = galerkin::coarse_operator(world, nodes, rows, &prolongator, &aggregates)?;
     let transfer = transfer(nodes, &prolongator, &coarse.nodes);
-    let mut level = Smoothed { product, largest, transfer, tied: None };
-    if let Some(block) = tied::block_of(world, nodes, rows, tied)? {
+    let mut level = Smoothed { product, largest, transfer, smoother: None };
+    if let Some(block) = tied::block_of(world, nodes, rows, tied, Cause::Ties)? {
         let mut smoother = BlockSmoother::new(world.comm(), inverse, Some(&block))?;
         let largest = spectrum::largest_smoothed::<K>(world, nodes, &level.product, &mut smoother)?;
         if let Some(largest) = largest {
-            (level.largest, level.tied) = (largest, Some(smoother));
+            (level.largest, level.smoother) = (largest, Some(smoother));
         }
     }
     Ok(Some((level, coarse, lengths.coarse)))
@@ -281,8 +290,31 @@ pub fn tie<const D: usize>(
     smoother: &mut BlockSmoother,
 ) -> Result<()> {
     let nodes = nodes_of(numbering);
-    let block = tied::block_of(world, &nodes, rows, tied)?;
+    let block = tied::block_of(world, &nodes, rows, tied, Cause::Ties)?;
     smoother.renew(inverse_diagonal(&product(&nodes, rows)), block.as_ref())
+}
+
+/// The nodes that flow under the unsymmetric `rows`. Collective.
+pub fn flow<const K: usize>(
+    world: &World,
+    numbering: &Numbering,
+    rows: &impl Rows<K>,
+) -> Result<Flow> {
+    let nodes = nodes_of(numbering);
+    let symmetric = symmetric_part(world, nodes.owned, &nodes.global, &nodes.halo, rows)?;
+    Ok(Flow::of(world, &nodes, rows, &symmetric))
+}
+
+/// Gives a smoother the values of the unsymmetric `rows`, and the block of the nodes that flow. Collective.
+pub fn follow_flow<const K: usize>(
+    world: &World,
+    numbering: &Numbering,
+    rows: &impl Rows<K>,
+    flow: &Flow,
+    smoother: &mut BlockSmoother,
+) -> Result<()> {
+    *smoother = flow.smoother(world, &nodes_of(numbering), rows)?;
+    Ok(())
 }
 
 /// A level's matrix for the cycle.

@@ -7,7 +7,7 @@ use crate::petsc::Index;
 use crate::system::terms::term::Correction;
 use crate::tensor::fused::Block;
 
-use super::block_smoother::TiedBlock;
+use super::block_smoother::{Cause, NodeBlock};
 use super::cycle::CoarsestRows;
 use super::level::{BlockCsr, Nodes, Rows};
 
@@ -77,15 +77,20 @@ fn add<const K: usize>(
     true
 }
 
-/// The block of the `tied` nodes of `rows`, owned ones; `None` where no rank has any. Collective.
+/// The block of the `chosen` nodes of `rows`, owned ones; `None` where no rank has any. Collective.
 pub fn block_of<const K: usize>(
     world: &World,
     nodes: &Nodes,
     rows: &impl Rows<K>,
-    tied: &[bool],
-) -> Result<Option<TiedBlock>> {
-    let of_rank: Vec<u32> =
-        tied.iter().enumerate().filter(|(_, tied)| **tied).map(|(node, _)| node as u32).collect();
+    chosen: &[bool],
+    cause: Cause,
+) -> Result<Option<NodeBlock>> {
+    let of_rank: Vec<u32> = chosen
+        .iter()
+        .enumerate()
+        .filter(|(_, chosen)| **chosen)
+        .map(|(node, _)| node as u32)
+        .collect();
     if !world.any(!of_rank.is_empty()) {
         return Ok(None);
     }
@@ -114,5 +119,5 @@ pub fn block_of<const K: usize>(
             block.offsets.push(block.columns.len() as Index);
         }
     }
-    Ok(Some(TiedBlock { nodes: of_rank, rows: block }))
+    Ok(Some(NodeBlock { cause, nodes: of_rank, rows: block }))
 }

@@ -202,8 +202,8 @@ impl<const D: usize> Levelled for Chain<D> {
             BlockProduct::collect::<D, D>(BLOCKS, BLOCKS, Vec::new(), BLOCKS, |k, row| {
                 row.push((k, unit));
             });
-        let levels = vec![Smoothed { product, largest: 1.5, transfer, tied: None }];
-        Ok(Some(Hierarchy { exact, levels, coarsest: rows::<D>(self.first) }))
+        let levels = vec![Smoothed { product, largest: 1.5, transfer, smoother: None }];
+        Ok(Some(Hierarchy { exact, levels, coarsest: rows::<D>(self.first), flow: None }))
     }
 
     fn fill(

@@ -13,11 +13,12 @@ use crate::deck::PETSC_PREFIXES as PREFIXES;
 use crate::error::{Error, Result};
 
 /// Prefixes that PETSc puts before the options of solvers inside solvers.
-const NESTED: [&str; 11] = [
+const NESTED: [&str; 12] = [
     "pc_gamg_esteig_",
     "telescope_",
     "mg_levels_",
     "mg_tied_",
+    "mg_flow_",
     "mg_coarse_",
     "mg_fine_",
     "sub_",

@@ -1,9 +1,11 @@
 //! A x + c x^3 = c on a made-up block, solved by Newton's method with multigrid.
 #![allow(dead_code)]
 
+use mpm_par::amg::flow::Flow;
 use mpm_par::amg::level::BlockCsr;
+use mpm_par::amg::symmetric_part::symmetric_part;
 use mpm_par::amg::tied::Ties;
-use mpm_par::amg::{self, Hierarchy, Levelled, Levels};
+use mpm_par::amg::{self, BlockSmoother, Hierarchy, Levelled, Levels};
 use mpm_par::blocks::BlockProduct;
 use mpm_par::error::Result;
 use mpm_par::parallel::World;
@@ -129,6 +131,25 @@ impl<const D: usize> NewtonProblem for Hardening<'_, D> {
 }
 
 impl<const D: usize> Levelled for Hardening<'_, D> {
+    fn flow(&mut self, matrix: &mut Matrix) -> Result<Option<Flow>> {
+        let (rows, nodes) = (self.of_matrix(matrix)?, &self.share.nodes);
+        let part = symmetric_part(self.world, nodes.owned, &nodes.global, &nodes.halo, &rows)?;
+        Ok(Some(Flow::of(self.world, nodes, &rows, &part)))
+    }
+
+    fn follow(
+        &mut self,
+        matrix: &mut Matrix,
+        flow: Option<&Flow>,
+        smoother: &mut BlockSmoother,
+    ) -> Result<()> {
+        let rows = self.of_matrix(matrix)?;
+        if let Some(flow) = flow {
+            *smoother = flow.smoother(self.world, &self.share.nodes, &rows)?;
+        }
+        Ok(())
+    }
+
     fn levels(&mut self) -> &mut Levels {
         &mut self.installed
     }

@@ -1,5 +1,6 @@
 //! What Newton's method asks of the equations: residual, tangent, reactions, end of the iteration.
 
+use crate::amg::flow::Flow;
 use crate::amg::level::Assembled;
 use crate::amg::{self, BlockSmoother, Hierarchy, Levelled, Levels};
 use crate::analysis::convergence::{converges_next, hardly_falls, stalls};
@@ -119,9 +120,30 @@ impl<const D: usize, const N: usize> Levelled for Equilibrium<'_, D, N> {
         })
     }
 
-    fn tie(&mut self, matrix: &mut Matrix, smoother: &mut BlockSmoother) -> Result<()> {
+    fn flow(&mut self, matrix: &mut Matrix) -> Result<Option<Flow>> {
+        if self.symmetric() {
+            return Ok(None);
+        }
         self.with_rows(matrix, |rows| {
-            let (world, of, ties) = (self.world, self.numbering, self.ties(rows)?);
+            if self.ties(rows)?.are_there(self.world) {
+                return Ok(None);
+            }
+            amg::flow::<N>(self.world, self.numbering, rows).map(Some)
+        })
+    }
+
+    fn follow(
+        &mut self,
+        matrix: &mut Matrix,
+        flow: Option<&Flow>,
+        smoother: &mut BlockSmoother,
+    ) -> Result<()> {
+        self.with_rows(matrix, |rows| {
+            let (world, of) = (self.world, self.numbering);
+            if let Some(flow) = flow {
+                return amg::follow_flow::<N>(world, of, rows, flow, smoother);
+            }
+            let ties = self.ties(rows)?;
             if self.symmetric() {
                 return amg::tie::<N>(world, of, rows, &ties.nodes, smoother);
             }
