@@ -704,7 +704,7 @@ fn keys_remember_their_places() {
     let sets = ["load.0.point.force=[0, 1]".to_string()];
     let deck = deck::read(Path::new("beam.toml"), BEAM, &sets).unwrap_or_else(|e| panic!("{e}"));
     assert_eq!(
-        deck.places.say("grid.h", "too fine"),
+        deck.origins.message("grid.h", "too fine"),
         "\
 beam.toml:23:5: grid.h: too fine
     |
@@ -712,12 +712,14 @@ beam.toml:23:5: grid.h: too fine
     |     ^^^"
     );
     assert!(
-        deck.places.say("boundary.1.fix", "so").starts_with("beam.toml:43:7: boundary.1.fix: so")
+        deck.origins
+            .message("boundary.1.fix", "so")
+            .starts_with("beam.toml:43:7: boundary.1.fix: so")
     );
-    assert!(deck.places.say("boundary.1.rotation", "no").starts_with("beam.toml:41:"));
+    assert!(deck.origins.message("boundary.1.rotation", "no").starts_with("beam.toml:41:"));
     assert_eq!(
-        deck.places.say("load.0.point.force", "weak"),
+        deck.origins.message("load.0.point.force", "weak"),
         "--set load.0.point.force=[0, 1]: load.0.point.force: weak"
     );
-    assert_eq!(deck.places.say("conditioning", "none"), "beam.toml: conditioning: none");
+    assert_eq!(deck.origins.message("conditioning", "none"), "beam.toml: conditioning: none");
 }

@@ -176,7 +176,7 @@ fn a_long_line_takes_memory_in_proportion_to_its_length() {
         let text = include_str!("decks/block.toml")
             .replace("shape = { box = { min = [0, 0], max = [4, 3] } }", &shape);
         let deck = mpm_par::deck::read(Path::new("deck.toml"), &text, &[]).expect("a good deck");
-        (format!("{:?}", deck.places).len(), text.len())
+        (format!("{:?}", deck.origins).len(), text.len())
     };
     for count in [50, 400] {
         let (kept, written) = read(count);

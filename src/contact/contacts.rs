@@ -242,7 +242,7 @@ fn joined_fields(deck: &Deck, pairs: &[BodyPair], nodes: usize) -> Result<Fields
         name(two),
         between.map_or("others", name),
     );
-    Err(Error::Input(deck.places.say(&format!("contact.{}.between", pair.index), &why)))
+    Err(Error::Input(deck.origins.message(&format!("contact.{}.between", pair.index), &why)))
 }
 
 fn friction(contact: &model::Contact) -> Friction {
@@ -267,18 +267,18 @@ fn rigid<const D: usize>(deck: &Deck, index: usize, rigid: &model::Rigid) -> Res
     let surface = surface(&rigid.shape, rings).ok_or_else(|| {
         let why =
             "the shape has no inside: its corners lie on a line, or two in a row in one place";
-        Error::Input(deck.places.say(&format!("rigid.{index}.shape"), why))
+        Error::Input(deck.origins.message(&format!("rigid.{index}.shape"), why))
     })?;
     let free = match &rigid.free {
         None => None,
         Some(_) if rings => {
             let why = "a body of revolution cannot move freely: leave the density out";
-            return Err(Error::Input(deck.places.say(&format!("rigid.{index}.density"), why)));
+            return Err(Error::Input(deck.origins.message(&format!("rigid.{index}.density"), why)));
         }
         Some(free) => {
             let solid = surface.solid().ok_or_else(|| {
                 let why = "a body of this shape has no known volume, and so no mass";
-                Error::Input(deck.places.say(&format!("rigid.{index}.density"), why))
+                Error::Input(deck.origins.message(&format!("rigid.{index}.density"), why))
             })?;
             Some(FreeBody::new(&solid, free))
         }

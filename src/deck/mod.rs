@@ -11,7 +11,7 @@
 //! | `synonyms.rs`, `slips.rs` | what other programs call things; slips of the pen, and their cure |
 //! | `unread.rs` | keys that the deck's choices leave unread |
 //! | `marks.rs` | the text of a deck, and how a message points into it |
-//! | `places.rs` | where each key is written, for faults seen later |
+//! | `origins.rs` | where each key is written, for faults seen later |
 //! | `sections/` | each section's values and the checks across sections |
 //! | `resolved/` | the deck with every default, as TOML |
 //! | `physics.rs` | the part that a continued run must share |
@@ -35,8 +35,8 @@ mod marks;
     reason = "fields and variants are keys and words of the deck: docs/guide/deck.md"
 )]
 pub mod model;
+mod origins;
 pub(crate) mod physics;
-mod places;
 mod problems;
 mod reader;
 pub mod reference;
@@ -57,7 +57,7 @@ use std::path::{Path, PathBuf};
 pub use crossing::Side;
 pub use expression::{Expression, Scope};
 pub use model::Deck;
-pub use places::Places;
+pub use origins::Origins;
 pub use problems::{Got, Reported, figure, nearest, rough};
 pub use reader::Table;
 pub use resolved::{resolved, toml_text};
@@ -111,7 +111,7 @@ fn checked(problems: &Problems, path: &Path, text: &str, sets: &[String]) -> pro
     let notes = unread::check(problems, &mut root);
     let mut deck = sections::deck(problems, &root, &directory(path))?;
     deck.notes = notes;
-    deck.places = problems.places(&root);
+    deck.origins = problems.origins(&root);
     Ok(deck)
 }
 

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::sync::Arc;
 
 use super::marks::Sources;
-use super::places::Places;
+use super::origins::Origins;
 use super::tree::{Node, Origin};
 use crate::error::Error;
 
@@ -51,8 +51,8 @@ impl Problems {
     }
 
     /// Where the keys below `root` are written.
-    pub fn places(&self, root: &Node) -> Places {
-        Places::of(root, &self.sources)
+    pub fn origins(&self, root: &Node) -> Origins {
+        Origins::of(root, &self.sources)
     }
 
     /// The problems as one error, if there are any.

@@ -72,7 +72,7 @@ fn overlap(deck: &Deck, first: usize, second: usize, how: String) -> Error {
         "bodies \"{a}\" and \"{b}\" overlap: {how}, where their mass would count twice; cut one \
          out of the other (shape = {{ difference = [...] }}), move it, or say overlap = \"allow\""
     );
-    Error::Input(deck.places.say(&format!("body.{second}.shape"), &message))
+    Error::Input(deck.origins.message(&format!("body.{second}.shape"), &message))
 }
 
 /// Bodies of one file, or of the same cells of a mesh.

@@ -41,7 +41,7 @@ impl<'a, const D: usize> CellSeeding<'a, D> {
                  all their faces, into as many parts along each edge"
             );
             let key = format!("body.{index}.points_per_cell");
-            return Err(Error::Input(deck.places.say(&key, &message)));
+            return Err(Error::Input(deck.origins.message(&key, &message)));
         }
         let (shape, tag) = match &body.source {
             BodySource::Shape { shape, .. } => (Some(shape), None),

@@ -136,7 +136,7 @@ pub fn physics_of(world: &World, deck: &Deck) -> Result<Physics> {
             BodySource::File(file) => {
                 let sum = checksum_of_file(world, &file.path, |reason| {
                     let message = format!("cannot read {}: {reason}", file.path.display());
-                    deck.places.say(&format!("body.{index}.shape.points"), &message)
+                    deck.origins.message(&format!("body.{index}.shape.points"), &message)
                 })?;
                 physics.push_line(&checksum_line(&file.path, sum));
             }

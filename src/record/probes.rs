@@ -35,7 +35,7 @@ pub fn find<const D: usize>(
     points: &Points<D>,
 ) -> Result<Vec<Followed>> {
     let refuse = |index: usize, key: &str, why: &str| {
-        Err(Error::Input(deck.places.say(&format!("probe.{index}.{key}"), why)))
+        Err(Error::Input(deck.origins.message(&format!("probe.{index}.{key}"), why)))
     };
     let mut all = Vec::new();
     for (index, probe) in deck.probes.iter().enumerate() {

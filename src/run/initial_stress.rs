@@ -106,7 +106,7 @@ fn message_at<const D: usize>(
         figure(stress[(2, 2)]),
         figure(stress[(0, 1)]),
     );
-    deck.places.say(&format!("body.{body}.initial_stress"), &message)
+    deck.origins.message(&format!("body.{body}.initial_stress"), &message)
 }
 
 /// In the plane the third axis is z.

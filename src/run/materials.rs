@@ -53,7 +53,7 @@ pub fn equip<const D: usize>(
                 points.id[p], body.name
             );
             let key = format!("material.{}.ocr", material.name);
-            fault = Some((points.id[p], deck.places.say(&key, &why)));
+            fault = Some((points.id[p], deck.origins.message(&key, &why)));
         }
         points.state.set(p, &state);
     }
@@ -135,7 +135,7 @@ fn set_parameters<const D: usize>(
                 "at point {} of body \"{}\", X = {:?} m",
                 points.id[p], deck.bodies[body as usize].name, points.position_initial[p]
             );
-            fault = Some((points.id[p], deck.places.say(&key, &format!("{place}: {why}"))));
+            fault = Some((points.id[p], deck.origins.message(&key, &format!("{place}: {why}"))));
         }
         points.parameters.of_mut(p, body).copy_from_slice(&values);
     }

@@ -257,7 +257,7 @@ fn check_tags<const D: usize>(deck: &Deck, grid: &Grid<D>) -> Result<()> {
         if let model::Place::Tag(tag) = &boundary.place {
             let key = format!("boundary.{index}.where.tag");
             let place = |error: Error| match error {
-                Error::Input(why) => Error::Input(deck.places.say(&key, &why)),
+                Error::Input(why) => Error::Input(deck.origins.message(&key, &why)),
                 other => other,
             };
             grid.tagged_nodes(tag).map_err(place)?;
@@ -322,7 +322,7 @@ fn find_carriers<const D: usize>(
             let of = Some((*body, deck.bodies[*body].name.as_str()));
             let id = require_near(world, grid, points, of, place).map_err(|why| {
                 let key = format!("load.{index}.point.nearest");
-                Error::Input(deck.places.say(&key, &why))
+                Error::Input(deck.origins.message(&key, &why))
             })?;
             all[index].carriers.push((id, 1.0 / nearest.len() as f64));
         }

@@ -24,7 +24,7 @@ pub fn of_body<const D: usize>(
     key: &str,
 ) -> Result<Surface<D>> {
     let body = &deck.bodies[wanted.body];
-    let wrong = |why: &str| Error::Input(deck.places.say(key, why));
+    let wrong = |why: &str| Error::Input(deck.origins.message(key, why));
     let Some(shape) = shape_of(deck, wanted.body) else {
         return Err(wrong(&format!("body \"{}\" is not given as a shape", body.name)));
     };
@@ -65,7 +65,7 @@ pub fn facing<const D: usize>(
                 "the shape of body \"{name}\" has a condition (where), of which no surface is known, \
                  and in implicit runs surfaces touch: describe it by boxes, discs, polygons, ..."
             );
-            return Err(Error::Input(deck.places.say(&key, &why)));
+            return Err(Error::Input(deck.origins.message(&key, &why)));
         }
         of_body(world, deck, points, &wanted, &key).map(Some)
     };
@@ -114,13 +114,13 @@ fn on_sheet<const D: usize>(
         let what = format!("body \"{}\"", deck.bodies[body].name);
         let carried = carriers::carried(world, points, body, &elements, spacing, &what);
         let carried =
-            carried.map_err(|error| Error::Input(deck.places.say(key, &error.to_string())))?;
+            carried.map_err(|error| Error::Input(deck.origins.message(key, &error.to_string())))?;
         all.extend(carried);
     }
     if !all.iter().any(|(_, own)| sheet.holds(&own.element.place)) {
         let why = "no material of a body given as a shape lies there at the start: what comes later is \
                    not held by it";
-        return Err(Error::Input(deck.places.say(key, why)));
+        return Err(Error::Input(deck.origins.message(key, why)));
     }
     Ok(Surface::new(all))
 }

@@ -50,7 +50,7 @@ pub fn require_apart<const D: usize>(
              {:?} m (the domain of point {id}); move one of them by as much along {:?}",
             corner.place, corner.near.normal
         );
-        (id, deck.places.say(&format!("contact.{}.between", pair.index), &why))
+        (id, deck.origins.message(&format!("contact.{}.between", pair.index), &why))
     });
     world.lowest_message(message).map_or(Ok(()), |message| Err(Error::Input(message)))
 }

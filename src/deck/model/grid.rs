@@ -45,7 +45,7 @@ pub enum MeshSource {
         min: Vec<f64>,
         max: Vec<f64>,
         cells: Vec<usize>,
-        /// Places and distances of the grid lines of each axis; empty: equal cells.
+        /// Origins and distances of the grid lines of each axis; empty: equal cells.
         stations: Vec<Vec<Station>>,
         element: Element,
     },

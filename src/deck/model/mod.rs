@@ -26,7 +26,7 @@ pub mod stations;
 
 use std::path::PathBuf;
 
-use crate::deck::places::Places;
+use crate::deck::origins::Origins;
 use crate::deck::stage::{Presence, Stage};
 
 pub use analysis::*;
@@ -76,7 +76,7 @@ pub struct Deck {
     /// What the user should know of the deck itself, a line each.
     pub notes: Vec<String>,
     /// Where the keys are written.
-    pub places: Places,
+    pub origins: Origins,
 }
 
 impl Deck {

@@ -5,7 +5,7 @@ pub type Station = [f64; 2];
 
 /// Lines from the first place to the last, each place on one of them. From place to place the distance
 /// grows linearly with the coordinate, h(x) = h_0 + (h_1 - h_0) (x - x_0) / (x_1 - x_0), so that each
-/// cell is longer than the one before by the same factor. Places must ascend, and distances be positive.
+/// cell is longer than the one before by the same factor. Origins must ascend, and distances be positive.
 pub fn lines(stations: &[Station]) -> Vec<f64> {
     let mut lines: Vec<f64> = stations.first().map(|[place, _]| *place).into_iter().collect();
     for pair in stations.windows(2) {

@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::deck::model::{
     Analysis, Deck, ElementPath, ElementTest, Grid, LatticeGrid, Material, Method, Output, Parallel,
 };
-use crate::deck::places::Places;
+use crate::deck::origins::Origins;
 use crate::deck::problems::Got;
 use crate::deck::reader::Table;
 
@@ -66,7 +66,7 @@ pub fn deck(root: &Table<'_>, basics: Basics, directory: &Path) -> Got<Deck> {
         element_test: Some(test),
         petsc: Vec::new(),
         notes: Vec::new(),
-        places: Places::default(),
+        origins: Origins::default(),
     })
 }
 

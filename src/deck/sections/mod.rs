@@ -41,7 +41,7 @@ pub(super) mod surfaces;
 use std::path::Path;
 
 use super::model::{AnalysisType, Deck};
-use super::places::Places;
+use super::origins::Origins;
 use super::problems::{Got, Problems};
 use super::reader::Table;
 use super::schema;
@@ -159,7 +159,7 @@ pub fn deck(problems: &Problems, root: &Node, directory: &Path) -> Got<Deck> {
         element_test: None,
         petsc: petsc?,
         notes: Vec::new(),
-        places: Places::default(),
+        origins: Origins::default(),
         grid,
     };
     grid::make_finite_elements(&root, &mut deck)?;

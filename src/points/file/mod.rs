@@ -57,7 +57,7 @@ pub fn read_points<const D: usize>(
             Refusal::Unreadable(reason) => {
                 let key = format!("body.{index}.shape.points");
                 let message = format!("cannot read {}: {reason}", path.display());
-                return Error::Input(deck.places.say(&key, &message));
+                return Error::Input(deck.origins.message(&key, &message));
             }
             Refusal::Wrong(Some(line), what) => (format!("{}:{line}", path.display()), what),
             Refusal::Wrong(None, what) => (path.display().to_string(), what),

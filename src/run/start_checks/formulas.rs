@@ -39,7 +39,7 @@ pub fn check<const D: usize>(
 fn velocities<const D: usize>(world: &World, deck: &Deck, points: &Points<D>) -> Result<()> {
     let fault = |p: usize| (0..D).find(|&a| !points.velocity[p][a].is_finite());
     let message = of_first_point(world, points, fault, |p, axis| {
-        deck.places.say(
+        deck.origins.message(
             &format!("body.{}.velocity", points.body[p]),
             &format!(
                 "{} is {} m/s at {}: the expression is not finite there",
@@ -68,7 +68,7 @@ fn boundaries<const D: usize>(
             && let Some(why) = without_nodes(grid, min, max)
         {
             let key = format!("boundary.{index}.where.box");
-            return Err(Error::Input(deck.places.say(&key, &why)));
+            return Err(Error::Input(deck.origins.message(&key, &why)));
         }
         if let Some(from) = boundary.presence.from.filter(|from| *from > 0)
             && boundary.support().is_some()
@@ -90,7 +90,7 @@ fn boundaries<const D: usize>(
                 deck.bodies[body].name
             );
             let key = format!("boundary.{index}.where.cells_of");
-            return Err(Error::Input(deck.places.say(&key, &why)));
+            return Err(Error::Input(deck.origins.message(&key, &why)));
         }
         if boundary.support().is_some() {
             prescribed(model, index, span)?;
@@ -107,7 +107,7 @@ fn boundaries<const D: usize>(
         });
         let found = found.map_err(|error| match error {
             Error::Input(text) => {
-                Error::Input(deck.places.say(&format!("boundary.{index}.displacement"), &text))
+                Error::Input(deck.origins.message(&format!("boundary.{index}.displacement"), &text))
             }
             other => other,
         })?;
@@ -145,7 +145,7 @@ fn prescribed<const D: usize>(model: &Model<D>, index: usize, span: StepSpan) ->
                         u[axis], own.element.place
                     );
                     let key = format!("boundary.{index}.displacement.{}", AXES[axis]);
-                    return Err(Error::Input(model.deck.places.say(&key, &why)));
+                    return Err(Error::Input(model.deck.origins.message(&key, &why)));
                 }
             }
         }

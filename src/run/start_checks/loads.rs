@@ -36,7 +36,7 @@ pub fn check<const D: usize>(
         };
         if let Some((key, why)) = message {
             let key = format!("load.{index}.{key}");
-            return Err(Error::Input(model.deck.places.say(&key, &why)));
+            return Err(Error::Input(model.deck.origins.message(&key, &why)));
         }
     }
     Ok(())

@@ -25,7 +25,7 @@ pub fn check<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>
             };
             let message = of_first_point(world, of, fault, |p, k| {
                 let what = format!("its stiffness is {k} N/m at {}", place(of, p));
-                deck.places.say(&key, &format!("{what}: expected a value of zero or more"))
+                deck.origins.message(&key, &format!("{what}: expected a value of zero or more"))
             });
             if let Some(message) = message {
                 return Err(Error::Input(message));
@@ -34,7 +34,7 @@ pub fn check<const D: usize>(world: &World, model: &Model<D>, points: &Points<D>
         }
         if !world.any(acts) {
             let why = "acts on no point: its stiffness is zero at all of them";
-            return Err(Error::Input(deck.places.say(&key, why)));
+            return Err(Error::Input(deck.origins.message(&key, why)));
         }
     }
     Ok(())

@@ -6,26 +6,26 @@ use std::sync::Arc;
 use super::marks::Sources;
 use super::tree::{Node, Origin, Value};
 
-/// Where the keys are, by their dotted paths; the text itself is kept once.
+/// Where the keys are written, by their dotted paths; the text itself is kept once.
 #[derive(Debug, Clone, Default)]
-pub struct Places {
+pub struct Origins {
     sources: Arc<Sources>,
-    origins: BTreeMap<String, Origin>,
+    of_key: BTreeMap<String, Origin>,
 }
 
 /// The same deck may be written in many ways.
-impl PartialEq for Places {
+impl PartialEq for Origins {
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
-impl Places {
+impl Origins {
     /// Of all keys below `root`.
     pub(crate) fn of(root: &Node, sources: &Arc<Sources>) -> Self {
-        let mut places = Places { sources: sources.clone(), origins: BTreeMap::new() };
-        places.enter(root, "");
-        places
+        let mut all = Origins { sources: sources.clone(), of_key: BTreeMap::new() };
+        all.enter(root, "");
+        all
     }
 
     fn enter(&mut self, node: &Node, path: &str) {
@@ -46,16 +46,16 @@ impl Places {
         };
         for (path, child) in children {
             self.enter(child, &path);
-            self.origins.insert(path, child.origin.clone());
+            self.of_key.insert(path, child.origin.clone());
         }
     }
 
-    /// A message about the dotted `key` with its place: that of the table around it where the
+    /// A message about the dotted `key` with where it is written: the table around it where the
     /// deck does not write the key itself.
-    pub fn say(&self, key: &str, message: &str) -> String {
+    pub fn message(&self, key: &str, message: &str) -> String {
         let mut written = key;
         loop {
-            match (self.origins.get(written), written.rfind('.')) {
+            match (self.of_key.get(written), written.rfind('.')) {
                 (Some(origin), _) => {
                     let (place, lines) = self.sources.mark(origin);
                     return format!("{place}: {key}: {message}{lines}");
