@@ -36,12 +36,14 @@ NEW_SUBJECTS = {
         "surface/*", "run/surfaces.rs", "loads/pressing.rs", "loads/pressure.rs",
         "loads/surface_pressure.rs", "loads/traction.rs", "loads/water.rs", "system/supports.rs",
         "system/terms/pressure.rs", "system/terms/surface.rs", "system/terms/following.rs",
-        "system/terms/own_traction.rs", "system/terms/block.rs", "deck/sections/surfaces.rs"],
+        "system/terms/own_traction.rs", "system/terms/block.rs", "deck/sections/surfaces.rs",
+        "system/carried.rs", "system/holds.rs"],
+    "springs below points": ["system/terms/foundation.rs"],
     "contact and rigid bodies": [
         "contact/*", "analysis/explicit_bodies.rs", "analysis/explicit_contact.rs",
         "analysis/free_bodies.rs", "analysis/free_motion.rs", "system/apart.rs",
-        "system/facing.rs", "system/shared_nodes.rs", "system/terms/contact.rs",
-        "system/terms/facing.rs", "system/terms/node_gaps.rs", "system/terms/touching.rs",
+        "system/facing.rs", "system/shared_nodes.rs", "system/terms/contact/*",
+        "system/terms/facing.rs", "system/terms/touching.rs",
         "record/contact.rs", "deck/*/contact.rs", "output/series/rigid_file.rs"],
     "unsymmetric systems, penalties under multigrid": [
         "amg/block_smoother.rs", "amg/symmetric_part.rs", "amg/tied.rs",

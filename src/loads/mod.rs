@@ -8,7 +8,7 @@
 //! | `pressure` | [`Pressure`] | `pressure.rs` | Given et al. 2024: virtual stress |
 //! | `pressure.surface` | [`SurfacePressure`] | `surface_pressure.rs` | formulations.md B.6 (b) |
 //! | `traction` | [`Traction`] | `traction.rs` | formulations.md B.6 (b) |
-//! | `[water]` | [`Water`](model::Water) | `water.rs` | formulations.md B.7 |
+//! | `[water]` | [`Water`] | `water.rs` | formulations.md B.7 |
 //! | `manufactured` | [`Manufactured`] | `manufactured.rs` | Lagrangian §7.4 |
 //!
 //! A new load is one file that implements [`Declaration`] for what the deck says and [`Load`] for the force, and its

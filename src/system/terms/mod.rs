@@ -1,5 +1,5 @@
 //! Contributions to a step's equations. A new one that a table of the deck switches on is a file that implements
-//! [`Declaration`](declaration::Declaration) for what the deck says and [`Term`] for the step, and its name in the list
+//! [`Declaration`] for what the deck says and [`Term`] for the step, and its name in the list
 //! `terms!` below. `analysis/equilibrium/motion.rs` puts all terms of a step in their order.
 //!
 //! | term | file | source |
