@@ -152,6 +152,89 @@ fields = ["displacement"]
     }
 }
 
+const DUG: &str = r#"
+ghost = "off"
+[analysis]
+type = "quasi-static"
+tolerance = 1e-10
+[method]
+basis = "gimp"
+[grid]
+type = "lattice"
+origin = [0, -0.25]
+size = [6, 6]
+h = 0.5
+[material.soil]
+model = "hencky"
+young = 1e5
+poisson = 0.3
+[[body]]
+name = "low"
+material = "soil"
+density = 2000.0
+shape = { box = { min = [2, 2], max = [4, 2.75] } }
+[[body]]
+name = "high"
+material = "soil"
+density = 2000.0
+shape = { box = { min = [2, 2.75], max = [4, 3.25] } }
+until = "dig"
+[[foundation]]
+body = "low"
+axis = "y"
+stiffness = "1e6 * (Y < 2.25)"
+[[boundary]]
+where = { box = { min = [0, -1], max = [6, 6] } }
+fix = ["x"]
+[[load]]
+gravity = [0, -0.1]
+[[stage]]
+name = "load"
+steps = 2
+[[stage]]
+name = "dig"
+steps = 3
+[[probe]]
+name = "layer"
+near = [2.1, 2.1]
+fields = ["displacement"]
+"#;
+
+/// A body that goes takes its weight off the springs, over the stage in which it goes.
+#[test]
+fn what_is_dug_off_springs_lets_them_rise() {
+    for ranks in [1, 2] {
+        let results = Run::text(DUG).ranks(ranks).results();
+        let text = results.text("probes.csv");
+        let sunk = text.lines().skip(1).map(|row| row.rsplit(',').next().expect("a cell"));
+        let sunk: Vec<f64> = sunk.map(|u| u.parse().expect("a number")).collect();
+        let loads = [0.5, 1.0, 0.6 + 0.4 * 2.0 / 3.0, 0.6 + 0.4 / 3.0, 0.6];
+        let wanted = loads.map(|share| -share * 1.25 * 0.1 * 2000.0 / (1e6 * 0.25));
+        assert!(relative_difference(&sunk, &wanted) < 1e-8, "{ranks}: {sunk:?} {wanted:?}");
+    }
+}
+
+/// w(x) of the beam of inputs/winkler-beam.toml with a^2 = d / 2 + c / 4, b^2 = d / 2 - c / 4 (the inverse Fourier transform
+/// of Timoshenko's equation).
+#[test]
+fn a_beam_on_springs_bends_by_the_closed_form() {
+    let (young, k, load) = (1e7f64, 8.533333333333334e4, 2000.0);
+    let (bending, shear) = (young / 12.0, 5.0 / 6.0 * young / 2.0);
+    let (c, d) = (k / shear, (k / bending).sqrt());
+    let (a, b) = ((d / 2.0 + c / 4.0).sqrt(), (d / 2.0 - c / 4.0).sqrt());
+    let exact = |x: f64| {
+        let (cos, sin) = ((b * x).cos(), (b * x).sin());
+        let sum = (b * cos + a * sin) / d + bending / shear * (b * cos - a * sin);
+        -load / (4.0 * bending * a * b) * (-a * x).exp() * sum
+    };
+    let results = Run::of("winkler-beam").ranks(2).results();
+    for (name, x, tolerance) in [("middle", 0.03125, 0.01), ("uplift", 7.84375, 0.1)] {
+        let found = probed(&results, &format!("{name}.displacement.y"));
+        assert!((found / exact(x) - 1.0).abs() < tolerance, "{name}: {found} {}", exact(x));
+    }
+    assert!(exact(7.84375) > 0.0);
+}
+
 /// What is wrong is told before anything is written, with the key.
 #[test]
 fn its_key_is_read_as_all_others() {
