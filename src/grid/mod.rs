@@ -41,8 +41,7 @@ pub use mesh::Mesh;
 use crate::error::{Error, Result};
 
 /// Either grid, dispatched per call; both answer the same questions.
-// One grid per run: its size does not matter.
-#[allow(clippy::large_enum_variant)]
+#[allow(clippy::large_enum_variant, reason = "one grid per run: its size does not matter")]
 #[derive(Debug, Clone)]
 pub enum Grid<const D: usize> {
     /// Equal boxes.
