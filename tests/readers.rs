@@ -201,6 +201,39 @@ fn lists_go_on_after_a_restart() {
     assert!(!has("points.xdmf") && !has("points.vtkhdf.series") && !has("grid.xdmf"), "{left:?}");
 }
 
+/// A list that is gone is said to be, one that is cut short is refused, and one in a format that the deck no longer
+/// asks for ends where the run goes on: later files are gone, or are no files of that format.
+#[test]
+fn lists_of_all_formats_are_cared_for_at_a_restart() {
+    let whole = beam().results();
+    let read = |name: &str| whole.text(name);
+    let (pvd, series) = (read("points.pvd"), read("points.vtkhdf.series"));
+    let folder = whole.into_folder();
+    let out = folder.path().join("out");
+    let go_on = |run: Run, folder| {
+        let checkpoint = out.join("checkpoint-000002.h5").display().to_string();
+        run.word("--restart").word(checkpoint).attempt_in(folder)
+    };
+    std::fs::write(out.join("points.pvd"), &pvd[..pvd.len() - 60]).unwrap();
+    let refused = go_on(beam().ranks(2), folder);
+    assert_eq!(refused.code, 3, "{}", refused.stderr);
+    let why = "points.pvd is not a time series that this program wrote";
+    assert!(refused.stderr.contains(why), "{}", refused.stderr);
+
+    std::fs::remove_file(out.join("points.pvd")).unwrap();
+    let again = go_on(beam().set("output.format=[\"vtu\"]"), refused.folder);
+    assert_eq!(again.code, 0, "{}", again.stderr);
+    let said = format!("{}{}", again.stdout, again.stderr);
+    assert!(said.contains("points.pvd is not there: the series begins anew after step 2"), "{said}");
+    assert!(!said.contains("domains.pvd is not there"), "{said}");
+    let text = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    assert_eq!(text("points.pvd").matches("<DataSet").count(), 1);
+    assert_eq!(series.matches("points-").count(), 3);
+    assert_eq!(text("points.vtkhdf.series").matches("points-").count(), 2);
+    assert_eq!(text("points.xdmf").matches("<Grid Name=\"step ").count(), 2);
+    assert_eq!(text("grid.xdmf").matches("<Grid Name=\"step ").count(), 1);
+}
+
 /// All series, by the reader that ParaView chooses for the file, and a picture of one.
 #[test]
 #[ignore = "needs ParaView: MPM_PAR_PVPYTHON names its pvpython"]

@@ -67,16 +67,9 @@ impl FrameList {
         on_root(comm, || {
             let path = self.file.path();
             if path.exists() {
-                let text = fs::read_to_string(path).map_err(|reason| cannot_read(path, &reason))?;
-                let all = match self.format {
-                    Format::Xdmf => xdmf::split(&text).ok_or_else(|| not_ours(path))?,
-                    _ => text.lines().filter_map(|line| numbered(self.name, line)).collect(),
-                };
-                let before = all.len();
-                self.entries = all.into_iter().filter(|(step, _)| *step <= last_step).collect();
-                self.longer = self.entries.len() < before;
-                self.file.assume(texts(&self.entries));
-            } else if self.format == Format::Xdmf && has_frames(path, self.data, last_step)? {
+                let entries = self.found()?.ok_or_else(|| not_ours(path))?;
+                self.keep(entries, last_step);
+            } else if has_frames(path, self.data, last_step)? {
                 log.say(&format!(
                     "warning: {} is not there: the series begins anew after step {last_step}, and \
                      does not show the earlier frames",
@@ -85,6 +78,35 @@ impl FrameList {
             }
             Ok(())
         })
+    }
+
+    /// Looks for the list of an earlier run in a format that the deck no longer asks for: frames after `last_step`
+    /// go, and a list must not name them. What is no list of ours stays as it is.
+    pub fn end(&mut self, last_step: usize, comm: &SimpleCommunicator) -> Result<()> {
+        on_root(comm, || {
+            if self.file.path().exists()
+                && let Some(entries) = self.found()?
+            {
+                self.keep(entries, last_step);
+            }
+            Ok(())
+        })
+    }
+
+    /// Step and text of each frame in the file; `None` if the file is no whole list of this kind.
+    fn found(&self) -> Result<Option<Vec<(usize, String)>>> {
+        let path = self.file.path();
+        let bytes = fs::read(path).map_err(|reason| cannot_read(path, &reason))?;
+        let text = std::str::from_utf8(&bytes).ok();
+        Ok(text.and_then(|text| entries_of(self.format, self.name, text)))
+    }
+
+    fn keep(&mut self, mut entries: Vec<(usize, String)>, last_step: usize) {
+        let before = entries.len();
+        entries.retain(|(step, _)| *step <= last_step);
+        self.longer = entries.len() < before;
+        self.entries = entries;
+        self.file.assume(texts(&self.entries));
     }
 
     /// Takes what comes later out of the file.
@@ -145,6 +167,16 @@ fn texts(entries: &[(usize, String)]) -> impl Iterator<Item = &str> + Clone {
     entries.iter().map(|(_, text)| text.as_str())
 }
 
+/// Step and text of each frame that the text of a list names; `None` if it is no whole list.
+fn entries_of(format: Format, name: &str, text: &str) -> Option<Vec<(usize, String)>> {
+    if format == Format::Xdmf {
+        return xdmf::split(text);
+    }
+    let (head, tail) = ends(format);
+    let lines = text.strip_prefix(head)?.strip_suffix(tail)?;
+    lines.lines().map(|line| numbered(name, line)).collect()
+}
+
 /// The step that a line names, and the line.
 fn numbered(name: &str, line: &str) -> Option<(usize, String)> {
     let rest = line.split(&format!("\"{name}-")).nth(1)?;
@@ -179,8 +211,12 @@ mod tests {
             let entries: Vec<String> =
                 steps.map(|s| line(format, "points", (s, 0.1 * s as f64), s == 0)).to_vec();
             let text = format!("{head}{}{tail}", entries.concat());
-            let found: Vec<_> = text.lines().filter_map(|line| numbered("points", line)).collect();
-            assert_eq!(found, steps.into_iter().zip(entries).collect::<Vec<_>>());
+            let wanted = steps.into_iter().zip(entries).collect::<Vec<_>>();
+            assert_eq!(entries_of(format, "points", &text), Some(wanted));
+            // Cut short, within a line, too.
+            for length in 0..text.len() {
+                assert_eq!(entries_of(format, "points", &text[..length]), None, "{length}");
+            }
             if format == Format::VtkHdf {
                 let list: serde_json::Value = serde_json::from_str(&text).unwrap();
                 assert_eq!(list["files"][1]["name"], "points-000005.h5");

@@ -6,6 +6,7 @@ use super::frame::{Frame, Totals};
 use super::frame_list::FrameList;
 use super::hdf5_writer::FileWriter;
 use super::{vtkhdf, vtu};
+use crate::deck::choices::Choice;
 use crate::deck::model::Format;
 use crate::error::Result;
 use crate::output::directory::ResultsDirectory;
@@ -20,6 +21,8 @@ pub struct Series {
     /// Beginning of the files' names: `points`, `domains`, `grid` or `rigid`.
     name: &'static str,
     lists: Vec<FrameList>,
+    /// Those in formats that the deck does not ask for, which the run before a restart may have left.
+    ended: Vec<FrameList>,
     /// Number of the present stage, from one, which each file then states.
     pub stage: Option<u64>,
 }
@@ -31,9 +34,11 @@ impl Series {
         (name, data): (&'static str, &'static str),
         formats: &[Format],
     ) -> Self {
-        let list = |&format: &Format| FrameList::new(directory, (name, data), format);
-        let lists = formats.iter().map(list).collect();
-        Self { directory: directory.clone(), name, lists, stage: None }
+        let list = |format| FrameList::new(directory, (name, data), format);
+        let lists = formats.iter().map(|&format| list(format)).collect();
+        let others = Format::SPELLINGS.iter().map(|(_, format)| *format);
+        let ended = others.filter(|format| !formats.contains(format)).map(list).collect();
+        Self { directory: directory.clone(), name, lists, ended, stage: None }
     }
 
     /// Continues the lists of a run that is restarted after `last_step`. Nothing is written before
@@ -44,12 +49,13 @@ impl Series {
         log: &mut Log,
         comm: &SimpleCommunicator,
     ) -> Result<()> {
-        self.lists.iter_mut().try_for_each(|list| list.resume(last_step, log, comm))
+        self.lists.iter_mut().try_for_each(|list| list.resume(last_step, log, comm))?;
+        self.ended.iter_mut().try_for_each(|list| list.end(last_step, comm))
     }
 
     /// Takes what comes later than the step of the restart out of the lists.
     pub fn cut(&mut self, comm: &SimpleCommunicator) -> Result<()> {
-        self.lists.iter_mut().try_for_each(|list| list.cut(comm))
+        self.lists.iter_mut().chain(&mut self.ended).try_for_each(|list| list.cut(comm))
     }
 
     pub fn has(&self, format: Format) -> bool {
