@@ -90,7 +90,7 @@ pub(crate) fn advance<const D: usize>(
     }
     let exerted = declaration::exerted(Context::new(world, model, (&mesh, points), span), None)?;
     match pressed.is_empty() {
-        true => pressed = exerted,
+        true => pressed.clone_from(&exerted),
         false => add(&mut pressed, 1.0, &exerted),
     }
     let borne = supports_at_start(model, &mesh, points, span);
@@ -169,6 +169,16 @@ pub(crate) fn advance<const D: usize>(
         *r += taken / dt;
     }
     let pressure_work: f64 = pressed.iter().zip(&moved).map(|(f, u)| f * u).sum();
+    let stiffening = if exerted.is_empty() {
+        0.0
+    } else {
+        // What resists a motion along the way has done the work of its mean force: by the force of the start alone
+        // an oscillator would lose energy in every period.
+        let of = Context::new(world, model, (&mesh, points), span);
+        let ended = declaration::exerted(of, Some(&moved))?;
+        let gains = ended.iter().zip(&exerted).zip(&moved);
+        gains.map(|((end, start), u)| 0.5 * (end - start) * u).sum()
+    };
     // The force of a ring acts where its mass is, its place is the middle of its section.
     let weighed;
     let carried = if mesh.influences.hoop.is_empty() {
@@ -179,6 +189,7 @@ pub(crate) fn advance<const D: usize>(
     };
     let work = point_work(&external, carried)
         + pressure_work
+        + stiffening
         + touching.as_ref().map_or(0.0, |touching| touching.work)
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);

@@ -64,8 +64,13 @@ fn an_explicit_step_takes_the_force_of_its_start() {
     for ranks in [1, 2] {
         for update in ["usl", "usf", "musl"] {
             let run = Run::text(SWING).ranks(ranks).set(format!("method.stress_update={update}"));
-            let found = swings(&run.results());
+            let results = run.results();
+            let found = swings(&results);
             assert!(relative_difference(&found, &wanted) < 1e-11, "{update}, {ranks}: {found:?}");
+            // The springs, 1e5 N/m in all, have taken k x^2 / 2.
+            let taken: Vec<f64> = found.iter().map(|x| -0.5 * 1e5 * x * x).collect();
+            let work = results.history("work_external");
+            assert!(relative_difference(&work, &taken) < 1e-11, "{update}, {ranks}: {work:?}");
         }
     }
 }

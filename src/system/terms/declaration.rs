@@ -67,8 +67,8 @@ pub trait Declaration: Sized {
     /// that does not. It limits time steps of explicit analyses, and tells which pieces of the material are held.
     fn stiffness<const D: usize>(&self, points: &Points<D>, p: usize) -> [f64; D];
 
-    /// The term of a step. In explicit analyses its force at the step's start acts: there it meets no rows, and
-    /// the sparsity has fewer columns. Collective.
+    /// The term of a step. In explicit analyses its force at the step's start acts, and the mean of this force and of
+    /// the one at its end does the work: there it meets no rows, and the sparsity has fewer columns. Collective.
     fn make<'a, const D: usize>(&'a self, of: Context<'a, D>) -> Result<Box<dyn Term<D> + 'a>>;
 }
 
