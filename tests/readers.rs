@@ -224,7 +224,10 @@ fn lists_of_all_formats_are_cared_for_at_a_restart() {
     let again = go_on(beam().set("output.format=[\"vtu\"]"), refused.folder);
     assert_eq!(again.code, 0, "{}", again.stderr);
     let said = format!("{}{}", again.stdout, again.stderr);
-    assert!(said.contains("points.pvd is not there: the series begins anew after step 2"), "{said}");
+    assert!(
+        said.contains("points.pvd is not there: the series begins anew after step 2"),
+        "{said}"
+    );
     assert!(!said.contains("domains.pvd is not there"), "{said}");
     let text = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
     assert_eq!(text("points.pvd").matches("<DataSet").count(), 1);

@@ -155,6 +155,12 @@ fields = ["displacement"]
         let (strain, work) = (last(&results, "energy_strain"), last(&results, "work_external"));
         assert!((strain / work - 1.0).abs() < 1e-4, "{strain} {work}");
     }
+    let loose = Run::text(&deck).set("boundary=").attempt();
+    assert!(
+        loose.code == 2 && loose.stderr.contains("no [[boundary]] holds x: "),
+        "{}",
+        loose.stderr
+    );
 }
 
 const DUG: &str = r#"

@@ -40,7 +40,7 @@ pub fn check(
         "" => String::new(),
         name => format!(" in stage \"{name}\""),
     };
-    let message = if boundaries.is_empty() {
+    let message = if boundaries.is_empty() && free.len() == dimension {
         "no [[boundary]]: nothing holds the bodies, so that the quasi-static system is singular (any rigid motion solves it)".to_string()
     } else {
         format!(
