@@ -6,12 +6,106 @@
 //! round outline cuts other chords), while the functions of the outer cells, extended linearly,
 //! keep partition of unity and linear fields exact.
 
+use crate::deck::model::DomainUpdate;
 use crate::error::{Error, Result};
 use crate::grid::bins::REACH;
 use crate::grid::{Grid, ShapeFunctions};
 use crate::points::Points;
 
-use super::Row;
+use super::centre::{Moments, RowNodes};
+use super::contract::Basis;
+use super::domain::{self, DomainStep};
+use super::{Influences, Row, box_means, row};
+
+/// Domains that touch the grid at their corners only: what is their own.
+pub trait Cornered<const D: usize> {
+    /// Corners of point `p`'s domain as it is now, m.
+    fn places(points: &Points<D>, p: usize) -> [[f64; D]; 8];
+
+    /// The same with weights and gradients. Error: the domain has no volume.
+    fn shares(points: &Points<D>, p: usize) -> Result<Corners<D>>;
+
+    /// See [`Basis::check_domain`].
+    fn check(
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>>;
+}
+
+impl<const D: usize, T: Cornered<D>> Basis<D> for T {
+    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
+        let mut hint = None;
+        row::map_points(points, |p, row| {
+            T::shares(points, p)?.fill(grid, points, p, &mut hint, row)
+        })
+    }
+
+    fn populated_cells(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        p: usize,
+        mut hint: Option<usize>,
+        out: &mut Vec<usize>,
+    ) -> Result<()> {
+        let start = out.len();
+        let corners = T::places(points, p);
+        for_each_place(grid, points, p, &corners, &mut hint, |_, at| out.push(at.cell))?;
+        row::sort_tail(out, start);
+        Ok(())
+    }
+
+    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
+        Some(T::places(points, p))
+    }
+
+    fn domains_deform(&self) -> bool {
+        true
+    }
+
+    fn check_domain(
+        &self,
+        step: &DomainStep<'_, D>,
+        points: &Points<D>,
+        p: usize,
+        hint: &mut Option<usize>,
+    ) -> Result<Option<[[f64; D]; 8]>> {
+        T::check(step, points, p, hint)
+    }
+
+    fn update_domains(
+        &self,
+        _: DomainUpdate,
+        _: &DomainStep<'_, D>,
+        points: &mut Points<D>,
+    ) -> Result<usize> {
+        domain::update_extents(points, T::places);
+        Ok(0)
+    }
+
+    fn cell_moments(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &Influences<D>,
+        rows: RowNodes<'_>,
+    ) -> Result<Vec<Moments>> {
+        box_means::moments(grid, points, influences, rows, |p| T::places(points, p))
+    }
+
+    fn fill_cell_rows(
+        &self,
+        grid: &Grid<D>,
+        points: &Points<D>,
+        influences: &mut Influences<D>,
+        rows: RowNodes<'_>,
+        sums: &[Moments],
+    ) -> Result<()> {
+        box_means::fill(grid, points, influences, rows, sums, |p| T::places(points, p))
+    }
+}
 
 /// Corners with their weights (sum 1) and gradients (1/m, sum 0), 2^D of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,23 +135,6 @@ impl<const D: usize> Corners<D> {
         row.merge();
         Ok(())
     }
-}
-
-/// Appends the cells that hold the corners of a domain of point `p`, ascending.
-///
-/// Error: a corner beyond reach.
-pub(crate) fn populated_cells<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    corners: &[[f64; D]; 8],
-    mut hint: Option<usize>,
-    out: &mut Vec<usize>,
-) -> Result<()> {
-    let start = out.len();
-    for_each_place(grid, points, p, corners, &mut hint, |_, at| out.push(at.cell))?;
-    super::row::sort_tail(out, start);
-    Ok(())
 }
 
 /// Calls `visit` with each corner's number and the basis's values there. Corners on a face count

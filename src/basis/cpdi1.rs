@@ -6,20 +6,16 @@
 //! corner values: d/dxi_j of corner c's function has the mean sgn_cj / 2^D, and d/dx = H^-T d/dxi
 //! because H is constant. In 2D, with s = 2 H_1 and t = 2 H_2, this is Rotation's formula.
 
-use crate::deck::model::{DomainUpdate, GimpEdge};
+use crate::deck::model::GimpEdge;
 use crate::error::{Error, Result};
-use crate::grid::Grid;
 use crate::grid::element::{determinant, inverse};
 use crate::grid::lattice::CORNER_SIGNS;
 use crate::points::Points;
 use crate::tensor::dense;
 
-use super::centre::{Moments, RowNodes};
-use super::contract::Basis;
-use super::corner::{self, Corners, for_each_place};
+use super::corner::{Cornered, Corners, for_each_place};
 use super::declaration::{Declaration, Domain};
-use super::domain::{self, DomainStep};
-use super::{Influences, box_means, row};
+use super::domain::DomainStep;
 
 /// Parallelograms or parallelepipeds that follow F.
 pub struct Cpdi1;
@@ -35,73 +31,50 @@ impl Declaration for Cpdi1 {
     }
 }
 
-impl<const D: usize> Basis<D> for Cpdi1 {
-    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
-        let mut hint = None;
-        row::map_points(points, |p, row| corners(points, p)?.fill(grid, points, p, &mut hint, row))
+impl<const D: usize> Cornered<D> for Cpdi1 {
+    fn places(points: &Points<D>, p: usize) -> [[f64; D]; 8] {
+        corner_positions(points, p)
     }
 
-    fn populated_cells(
-        &self,
-        grid: &Grid<D>,
-        points: &Points<D>,
-        p: usize,
-        hint: Option<usize>,
-        out: &mut Vec<usize>,
-    ) -> Result<()> {
-        let corners = corner_positions(points, p);
-        corner::populated_cells(grid, points, p, &corners, hint, out)
+    fn shares(points: &Points<D>, p: usize) -> Result<Corners<D>> {
+        let edges = half_edges(points, p);
+        let inverse = inverse(&edges).filter(|_| determinant(&edges) > 0.0).ok_or_else(|| {
+            Error::Run(format!(
+                "the CPDI domain of point {} at {:?} m is flat or inverted: half edges (columns) \
+                 {edges:?} m; try smaller steps",
+                points.id[p], points.position[p]
+            ))
+        })?;
+        let share = 1.0 / f64::from(1u32 << D);
+        let mut out = Corners {
+            positions: positions(&points.position[p], &edges),
+            weights: [0.0; 8],
+            gradients: [[0.0; D]; 8],
+        };
+        for (corner, sign) in CORNER_SIGNS.iter().enumerate().take(1 << D) {
+            out.weights[corner] = share;
+            out.gradients[corner] = std::array::from_fn(|i| {
+                share * inverse.iter().zip(sign).map(|(row, s)| s * row[i]).sum::<f64>()
+            });
+        }
+        Ok(out)
     }
 
-    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
-        Some(corner_positions(points, p))
-    }
-
-    fn domains_deform(&self) -> bool {
-        true
-    }
-
-    fn check_domain(
-        &self,
+    fn check(
         step: &DomainStep<'_, D>,
         points: &Points<D>,
         p: usize,
         hint: &mut Option<usize>,
     ) -> Result<Option<[[f64; D]; 8]>> {
         let increment = dense::plus_unit(&step.increments[p]);
-        check_step(step.grids[1], points, p, &increment, &step.moved[p], hint)?;
+        let before = half_edges(points, p);
+        let edges: [[f64; D]; D] = std::array::from_fn(|i| {
+            std::array::from_fn(|j| (0..D).map(|k| increment[i][k] * before[k][j]).sum())
+        });
+        let centre = std::array::from_fn(|a| points.position[p][a] + step.moved[p][a]);
+        let moved = positions(&centre, &edges);
+        for_each_place(step.grids[1], points, p, &moved, hint, |_, _| ())?;
         Ok(None)
-    }
-
-    fn update_domains(
-        &self,
-        _: DomainUpdate,
-        _: &DomainStep<'_, D>,
-        points: &mut Points<D>,
-    ) -> Result<usize> {
-        domain::update_extents(points, corner_positions);
-        Ok(0)
-    }
-
-    fn cell_moments(
-        &self,
-        grid: &Grid<D>,
-        points: &Points<D>,
-        influences: &Influences<D>,
-        rows: RowNodes<'_>,
-    ) -> Result<Vec<Moments>> {
-        box_means::moments(grid, points, influences, rows, |p| corner_positions(points, p))
-    }
-
-    fn fill_cell_rows(
-        &self,
-        grid: &Grid<D>,
-        points: &Points<D>,
-        influences: &mut Influences<D>,
-        rows: RowNodes<'_>,
-        sums: &[Moments],
-    ) -> Result<()> {
-        box_means::fill(grid, points, influences, rows, sums, |p| corner_positions(points, p))
     }
 }
 
@@ -156,50 +129,4 @@ fn positions<const D: usize>(centre: &[f64; D], edges: &[[f64; D]; D]) -> [[f64;
         });
     }
     corners
-}
-
-/// Corners, weights and gradients of point `p`. Error: the domain has no volume.
-pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D>> {
-    let edges = half_edges(points, p);
-    let inverse = inverse(&edges).filter(|_| determinant(&edges) > 0.0).ok_or_else(|| {
-        Error::Run(format!(
-            "the CPDI domain of point {} at {:?} m is flat or inverted: half edges (columns) \
-             {edges:?} m; try smaller steps",
-            points.id[p], points.position[p]
-        ))
-    })?;
-    let share = 1.0 / f64::from(1u32 << D);
-    let mut out = Corners {
-        positions: positions(&points.position[p], &edges),
-        weights: [0.0; 8],
-        gradients: [[0.0; D]; 8],
-    };
-    for (corner, sign) in CORNER_SIGNS.iter().enumerate().take(1 << D) {
-        out.weights[corner] = share;
-        out.gradients[corner] = std::array::from_fn(|i| {
-            share * inverse.iter().zip(sign).map(|(row, s)| s * row[i]).sum::<f64>()
-        });
-    }
-    Ok(out)
-}
-
-/// Whether the step leaves point `p` a sound domain inside `after`, the grid of the next step:
-/// `increment` is the step's dF and `displacement` the point's, m. `hint`: a cell near the first
-/// corner; left at that of the last.
-///
-/// Errors: a corner outside `after`.
-pub fn check_step<const D: usize>(
-    after: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    increment: &[[f64; D]; D],
-    displacement: &[f64; D],
-    hint: &mut Option<usize>,
-) -> Result<()> {
-    let before = half_edges(points, p);
-    let edges: [[f64; D]; D] = std::array::from_fn(|i| {
-        std::array::from_fn(|j| (0..D).map(|k| increment[i][k] * before[k][j]).sum())
-    });
-    let centre = std::array::from_fn(|a| points.position[p][a] + displacement[a]);
-    for_each_place(after, points, p, &positions(&centre, &edges), hint, |_, _| ())
 }

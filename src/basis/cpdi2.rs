@@ -12,20 +12,16 @@
 //! map the diagonals exactly, and the area is half their cross product. Rotation's v_p is
 //! therefore [`Points::volume`]; in 3D the two differ at second order in the hexahedron's warp.
 
-use crate::deck::model::GimpEdge;
-use crate::deck::model::{DomainUpdate, Element};
+use crate::deck::model::{Element, GimpEdge};
 use crate::error::{Error, Result};
 use crate::grid::Grid;
 use crate::grid::element::{determinant, inverse, jacobian};
 use crate::grid::quadrature::gauss_rule;
 use crate::points::Points;
 
-use super::centre::{Moments, RowNodes};
-use super::contract::Basis;
-use super::corner::{self, Corners, for_each_place};
+use super::corner::{Cornered, Corners, for_each_place};
 use super::declaration::{Declaration, Domain};
-use super::domain::{self, DomainStep};
-use super::{Influences, box_means, row};
+use super::domain::DomainStep;
 
 /// Quadrilaterals or hexahedra whose corners follow the nodes.
 pub struct Cpdi2;
@@ -42,70 +38,25 @@ impl Declaration for Cpdi2 {
     }
 }
 
-impl<const D: usize> Basis<D> for Cpdi2 {
-    fn map_points(&self, grid: &Grid<D>, points: &Points<D>) -> Result<Influences<D>> {
-        let mut hint = None;
-        row::map_points(points, |p, row| corners(points, p)?.fill(grid, points, p, &mut hint, row))
+impl<const D: usize> Cornered<D> for Cpdi2 {
+    fn places(points: &Points<D>, p: usize) -> [[f64; D]; 8] {
+        points.corners[p]
     }
 
-    fn populated_cells(
-        &self,
-        grid: &Grid<D>,
-        points: &Points<D>,
-        p: usize,
-        hint: Option<usize>,
-        out: &mut Vec<usize>,
-    ) -> Result<()> {
-        corner::populated_cells(grid, points, p, &points.corners[p], hint, out)
+    /// A domain with a reflex angle still integrates to valid functions and is let through.
+    fn shares(points: &Points<D>, p: usize) -> Result<Corners<D>> {
+        let positions = points.corners[p];
+        let (weights, gradients) = sound(points, p, &positions)?;
+        Ok(Corners { positions, weights, gradients })
     }
 
-    fn corners(&self, points: &Points<D>, p: usize) -> Option<[[f64; D]; 8]> {
-        Some(points.corners[p])
-    }
-
-    fn domains_deform(&self) -> bool {
-        true
-    }
-
-    fn check_domain(
-        &self,
+    fn check(
         step: &DomainStep<'_, D>,
         points: &Points<D>,
         p: usize,
         hint: &mut Option<usize>,
     ) -> Result<Option<[[f64; D]; 8]>> {
         moved_corners(step.grids, points, p, hint, &|node| (step.nodal)(p, node)).map(Some)
-    }
-
-    fn update_domains(
-        &self,
-        _: DomainUpdate,
-        _: &DomainStep<'_, D>,
-        points: &mut Points<D>,
-    ) -> Result<usize> {
-        domain::update_extents(points, |points, p| points.corners[p]);
-        Ok(0)
-    }
-
-    fn cell_moments(
-        &self,
-        grid: &Grid<D>,
-        points: &Points<D>,
-        influences: &Influences<D>,
-        rows: RowNodes<'_>,
-    ) -> Result<Vec<Moments>> {
-        box_means::moments(grid, points, influences, rows, |p| points.corners[p])
-    }
-
-    fn fill_cell_rows(
-        &self,
-        grid: &Grid<D>,
-        points: &Points<D>,
-        influences: &mut Influences<D>,
-        rows: RowNodes<'_>,
-        sums: &[Moments],
-    ) -> Result<()> {
-        box_means::fill(grid, points, influences, rows, sums, |p| points.corners[p])
     }
 }
 
@@ -177,16 +128,6 @@ fn hexahedron<const D: usize>(x: &[[f64; D]; 8]) -> ([f64; 8], [[f64; D]; 8], f6
         }
     }
     (weights.map(|w| w / volume), gradients.map(|g| g.map(|g| g / volume)), volume)
-}
-
-/// Corners, weights and gradients of point `p`.
-///
-/// Error: a domain whose volume is not positive. A domain with a reflex angle still integrates
-/// to valid functions and is let through.
-pub fn corners<const D: usize>(points: &Points<D>, p: usize) -> Result<Corners<D>> {
-    let positions = points.corners[p];
-    let (weights, gradients) = sound(points, p, &positions)?;
-    Ok(Corners { positions, weights, gradients })
 }
 
 /// Weights and gradients of a domain of point `p`, if it has a volume.

@@ -5,8 +5,10 @@
 use nalgebra::Matrix3;
 
 use super::*;
-use crate::basis::{Row, cpdi1};
+use crate::basis::Row;
+use crate::basis::cpdi1::{self, Cpdi1};
 use crate::deck::model::Basis;
+use crate::grid::Grid;
 use crate::grid::generate::{annulus, box_mesh};
 use crate::grid::{Lattice, Mesh};
 use crate::points::rectangle_corners;
@@ -14,22 +16,13 @@ use crate::points::rectangle_corners;
 type Influence<const D: usize> =
     fn(&Grid<D>, &Points<D>, usize, &mut Row<D>) -> crate::error::Result<()>;
 
-fn influence1<const D: usize>(
+fn influence<T: Cornered<D>, const D: usize>(
     grid: &Grid<D>,
     points: &Points<D>,
     p: usize,
     row: &mut Row<D>,
 ) -> Result<()> {
-    cpdi1::corners(points, p)?.fill(grid, points, p, &mut None, row)
-}
-
-fn influence2<const D: usize>(
-    grid: &Grid<D>,
-    points: &Points<D>,
-    p: usize,
-    row: &mut Row<D>,
-) -> Result<()> {
-    corners(points, p)?.fill(grid, points, p, &mut None, row)
+    T::shares(points, p)?.fill(grid, points, p, &mut None, row)
 }
 
 fn point<const D: usize>(x: [f64; D], half: [f64; D]) -> Points<D> {
@@ -126,11 +119,11 @@ fn moments_hold_on_lattices_and_meshes() {
         (ring(Element::Tri3), [7.3, 1.1], shifted),
     ] {
         let points = strained(point(centre, [0.5, 0.3]));
-        influence1(&grid, &points, 0, &mut row).unwrap();
+        influence::<Cpdi1, _>(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, centre);
         assert!(row.cells().len() > 2);
         let points = polygon(&corners);
-        influence2(&grid, &points, 0, &mut row).unwrap();
+        influence::<Cpdi2, _>(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, points.position[0]);
         assert!(row.cells().len() > 2);
     }
@@ -147,10 +140,10 @@ fn moments_hold_on_lattices_and_meshes() {
     };
     for grid in [hex_lattice(), boxed(Element::Hex8), boxed(Element::Tet4)] {
         let points = strained(point([0.35, 0.2, 0.1], [0.4, 0.35, 0.3]));
-        influence1(&grid, &points, 0, &mut row).unwrap();
+        influence::<Cpdi1, _>(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, [0.35, 0.2, 0.1]);
         let points = polygon(&hex([0.35, 0.2, 0.1], 0.4));
-        influence2(&grid, &points, 0, &mut row).unwrap();
+        influence::<Cpdi2, _>(&grid, &points, 0, &mut row).unwrap();
         check_moments(&grid, &row, points.position[0]);
     }
 }
@@ -165,7 +158,7 @@ fn cpdi1_has_the_printed_gradients_in_the_plane() {
     assert!((v - points.volume(0)).abs() < 1e-14);
     let one_three = [(s[1] - t[1]) / (2.0 * v), (t[0] - s[0]) / (2.0 * v)];
     let two_four = [(s[1] + t[1]) / (2.0 * v), (-s[0] - t[0]) / (2.0 * v)];
-    let corners = cpdi1::corners(&points, 0).unwrap();
+    let corners = Cpdi1::shares(&points, 0).unwrap();
     for i in 0..2 {
         assert!((corners.gradients[0][i] - one_three[i]).abs() < 1e-14);
         assert!((corners.gradients[2][i] + one_three[i]).abs() < 1e-14);
@@ -182,7 +175,7 @@ fn cpdi1_has_the_printed_gradients_in_the_plane() {
 fn cpdi2_weights_and_gradients_are_the_integrals() {
     fn check<const D: usize>(element: Element, corners: &[[f64; D]]) {
         let points = polygon(corners);
-        let found = super::corners(&points, 0).unwrap();
+        let found = Cpdi2::shares(&points, 0).unwrap();
         let (mut volume, mut weights, mut gradients) = (0.0, [0.0; 8], [[0.0; D]; 8]);
         for (xi, gauss) in gauss_rule::<D>(element, 7) {
             let (dn, det) = crate::grid::element::gradients(element, corners, &xi).unwrap();
@@ -230,7 +223,7 @@ fn cpdi2_centre_is_the_centroid() {
 #[test]
 fn cpdi2_on_simplices_is_linear() {
     let [a, b, c] = [[0.2, 1.0], [1.1, 1.2], [0.5, 2.2]];
-    let found = corners(&polygon(&[a, b, c, c]), 0).unwrap();
+    let found = Cpdi2::shares(&polygon(&[a, b, c, c]), 0).unwrap();
     for (weight, exact) in [
         (found.weights[0], 1.0 / 3.0),
         (found.weights[1], 1.0 / 3.0),
@@ -240,7 +233,7 @@ fn cpdi2_on_simplices_is_linear() {
     }
     let tet = [[0.0, 0.1, 0.0], [1.0, 0.0, 0.2], [0.1, 1.2, 0.0], [0.3, 0.2, 0.9]];
     let [a, b, c, d] = tet;
-    let found = corners(&polygon(&[a, b, c, c, d, d, d, d]), 0).unwrap();
+    let found = Cpdi2::shares(&polygon(&[a, b, c, c, d, d, d, d]), 0).unwrap();
     let (dn, _) = crate::grid::element::gradients(Element::Tet4, &tet, &[0.2, 0.2, 0.2]).unwrap();
     for (vertex, group) in [(0, 0..1), (1, 1..2), (2, 2..4), (3, 4..8)] {
         let weight: f64 = found.weights[group.clone()].iter().sum();
@@ -262,7 +255,7 @@ fn a_rectangle_inside_a_box_cell_gives_the_standard_functions() {
         let (mut plain, mut row) = (Row::default(), Row::default());
         plain.add_place(&at);
         plain.merge();
-        let both: [Influence<D>; 2] = [influence1, influence2];
+        let both: [Influence<D>; 2] = [influence::<Cpdi1, _>, influence::<Cpdi2, _>];
         for basis in both {
             basis(grid, &points, 0, &mut row).unwrap();
             assert_eq!(row.cells(), [at.values.cell]);
@@ -290,7 +283,7 @@ fn a_domain_across_a_node_has_known_weights() {
     let grid = quad_lattice();
     let points = point([0.5, 1.2], [0.25, 0.2]);
     let mut row = Row::default();
-    influence1(&grid, &points, 0, &mut row).unwrap();
+    influence::<Cpdi1, _>(&grid, &points, 0, &mut row).unwrap();
     assert_eq!((row.entries().len(), row.cells().len()), (9, 4));
     let line = [0.25, 0.5, 0.25];
     let slope = [-1.0, 0.0, 1.0];
@@ -316,7 +309,7 @@ fn moved_corners_have_the_area_of_the_mean_gradient() {
         [0.1 * x * y - 0.05 * y * y, 0.07 * x * x + 0.04 * y]
     };
     let mut row = Row::default();
-    influence2(&grid, &points, 0, &mut row).unwrap();
+    influence::<Cpdi2, _>(&grid, &points, 0, &mut row).unwrap();
     let mut increment = Matrix3::identity();
     for (node, _, ds) in row.entries() {
         let u = u(*node);
@@ -377,10 +370,10 @@ fn a_corner_just_outside_keeps_the_moments_and_one_far_outside_is_an_error() {
     let grid = quad_lattice();
     let mut row = Row::default();
     let points = point([-0.95, 1.5], [0.1, 0.1]);
-    influence1(&grid, &points, 0, &mut row).unwrap();
+    influence::<Cpdi1, _>(&grid, &points, 0, &mut row).unwrap();
     check_moments(&grid, &row, [-0.95, 1.5]);
     let points = point([-0.95, 1.5], [0.3, 0.1]);
-    let both: [Influence<2>; 2] = [influence1, influence2];
+    let both: [Influence<2>; 2] = [influence::<Cpdi1, _>, influence::<Cpdi2, _>];
     for basis in both {
         let error = basis(&grid, &points, 0, &mut row).unwrap_err();
         assert_eq!(error.exit_code(), 1);
@@ -398,11 +391,11 @@ fn inverted_domains_are_refused() {
     let mut row = Row::default();
     let mut points = point([0.5, 1.5], [0.2, 0.2]);
     points.corners[0] = rectangle_corners([0.5, 1.5], [-0.2, 0.2]);
-    let text = influence2(&grid, &points, 0, &mut row).unwrap_err().to_string();
+    let text = influence::<Cpdi2, _>(&grid, &points, 0, &mut row).unwrap_err().to_string();
     assert!(text.contains("point 41") && text.contains("inverted"), "{text}");
     points.corners[0] = rectangle_corners([0.5, 1.5], [0.2, 0.2]);
     points.deformation_gradient[0][(1, 1)] = -0.5;
-    let text = influence1(&grid, &points, 0, &mut row).unwrap_err().to_string();
+    let text = influence::<Cpdi1, _>(&grid, &points, 0, &mut row).unwrap_err().to_string();
     assert!(text.contains("point 41") && text.contains("inverted"), "{text}");
     // The displacement that turns a domain over is caught when it happens.
     points.corners[0] = rectangle_corners([0.5, 1.5], [0.2, 0.2]);

@@ -242,19 +242,8 @@ impl CamClay {
         let (pressure, bulk) = self.pressure(-(trial[0] + trial[1] + trial[2]));
         let mean = (trial[0] + trial[1] + trial[2]) * (1.0 / 3.0);
         let two_mu = 2.0 * self.shear;
-        let mut tangent = [[bulk - two_mu / 3.0; 3]; 3];
-        for (a, row) in tangent.iter_mut().enumerate() {
-            row[a] += two_mu;
-        }
-        Response {
-            stress: trial.map(|e| two_mu * (e - mean) - pressure),
-            elastic_strain: trial,
-            tangent,
-            shear: [two_mu; 3],
-            state,
-            plastic_increment: 0.0,
-            dissipation: 0.0,
-        }
+        let stress = trial.map(|e| two_mu * (e - mean) - pressure);
+        Response::elastic(trial, stress, [bulk - two_mu / 3.0, two_mu], state)
     }
 }
 
@@ -393,16 +382,7 @@ impl Model for CamClay {
         }
         let stress = parts.map(|part| kept * part - e.pressure);
         let elastic_strain = parts.map(|part| part / e.growth - found.volume / 3.0);
-        let flow = [0, 1, 2].map(|a| strain[a] - elastic_strain[a]);
-        Response {
-            stress,
-            elastic_strain,
-            tangent,
-            shear: [kept; 3],
-            state: after,
-            plastic_increment: flow.iter().map(|e| e * e).sum::<f64>().sqrt(),
-            dissipation: (0..3).map(|a| stress[a] * flow[a]).sum(),
-        }
+        Response::returned(strain, (stress, elastic_strain), (tangent, [kept; 3]), after)
     }
 
     fn elastic_strain(&self, stress: [f64; 3]) -> [f64; 3] {

@@ -3,10 +3,10 @@
 //! p = xi c / eta (de Souza Neto, Peric, Owen 2008, section 8.3); with `softening` cohesion and angles
 //! fall with the plastic strain, with `hardening` the cohesion grows ([`super::softening`]).
 
-use super::model::elastic_by;
-use super::mohr_coulomb::{COHESION, DILATION, FRICTION, STIFF, check_cone, check_residual};
-use super::parameter::{POISSON, Parameter};
-use super::softening::{self, Change, check_hardening};
+use super::model::{elastic_by, perfect_or_changing};
+use super::mohr_coulomb::{check_parameters, ends_of_cone, of_cone};
+use super::parameter::Parameter;
+use super::softening::{self, Change};
 use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
 
 /// Share of the compared stresses; see the same constant of [`super::VonMises`].
@@ -161,17 +161,8 @@ impl DruckerPrager {
             ([self.strength / self.eta; 3], 0.0)
         };
         let elastic_strain = self.elasticity.strain(stress);
-        let flow = [0, 1, 2].map(|a| trial[a] - elastic_strain[a]);
-        let response = Response {
-            stress,
-            elastic_strain,
-            tangent,
-            shear: [shear; 3],
-            state: [0.0; MOST_STATE],
-            plastic_increment: flow.iter().map(|e| e * e).sum::<f64>().sqrt(),
-            dissipation: (0..3).map(|a| stress[a] * flow[a]).sum(),
-        };
-        (response, rate)
+        let (found, slopes) = ((stress, elastic_strain), (tangent, [shear; 3]));
+        (Response::returned(trial, found, slopes, [0.0; MOST_STATE]), rate)
     }
 }
 
@@ -179,47 +170,20 @@ impl Model for DruckerPrager {
     const NAME: &'static str = "drucker-prager";
     const DOC: &'static str = "Hencky elasticity with a Drucker-Prager cone, perfect, softening or \
         hardening, and its apex, non-associated where dilation differs from friction.";
-    const PARAMETERS: &'static [Parameter] = &[
-        STIFF,
-        POISSON,
-        FRICTION,
-        DILATION,
-        COHESION,
-        FIT,
-        softening::STRAIN,
-        softening::COHESION,
-        softening::FRICTION,
-        softening::DILATION,
-        softening::LENGTH,
-        softening::HARDENING,
-    ];
-    const STATE: &'static [StateVariable] = &[softening::KAPPA];
+    const PARAMETERS: &'static [Parameter] = &of_cone(FIT);
 
     fn new(p: &[f64]) -> Self {
         let ([eta, xi], [eta_bar, _]) = (cone(p[2], p[5]), cone(p[3], p[5]));
-        let change = Change::new(p[6], p[11], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]]);
+        let change = Change::new(p[6], p[11], ends_of_cone(p));
         let elasticity = Hencky::new(p[0], p[1]);
         DruckerPrager { elasticity, eta, strength: xi * p[4], eta_bar, change, fit: p[5] }
     }
 
-    fn state_words(&self) -> usize {
-        usize::from(self.change.is_some())
-    }
-
     fn check(p: &[f64]) -> Result<(), Misfit> {
-        check_cone(p[2], p[3], p[4])?;
-        check_hardening(p[6], p[11])?;
-        check_residual(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]]).map(drop)
+        check_parameters(p).map(drop)
     }
 
-    #[inline]
-    fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
-        match &self.change {
-            None => self.respond_perfectly(trial),
-            Some(change) => self.respond_changing(change, trial, state[0]),
-        }
-    }
-
+    perfect_or_changing!();
     elastic_by!(elasticity);
 
     fn symmetric(&self) -> bool {

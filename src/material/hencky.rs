@@ -69,19 +69,7 @@ impl Hencky {
     /// The response without plastic flow; `state` stays what it is.
     #[inline(always)]
     pub fn respond_with(&self, trial: [f64; 3], state: [f64; MOST_STATE]) -> Response {
-        let mut tangent = [[self.lambda; 3]; 3];
-        for (a, row) in tangent.iter_mut().enumerate() {
-            row[a] += 2.0 * self.mu;
-        }
-        Response {
-            stress: self.stress(trial),
-            elastic_strain: trial,
-            tangent,
-            shear: [2.0 * self.mu; 3],
-            state,
-            plastic_increment: 0.0,
-            dissipation: 0.0,
-        }
+        Response::elastic(trial, self.stress(trial), [self.lambda, 2.0 * self.mu], state)
     }
 }
 

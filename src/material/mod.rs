@@ -182,6 +182,19 @@ pub struct Entry {
     pub make: fn(&[f64]) -> Material,
 }
 
+/// The parameters of a law of the catalogue, given by key or what holds without, and the law.
+#[cfg(test)]
+pub fn law(name: &str, given: &[(&str, f64)]) -> (Vec<f64>, Material) {
+    let entry = entry(name).expect("a law of the catalogue");
+    let value = |known: &Parameter| {
+        let given = given.iter().find(|(key, _)| *key == known.key);
+        given.map_or_else(|| known.value_if_absent(), |(_, value)| *value)
+    };
+    let values: Vec<f64> = entry.parameters.iter().map(value).collect();
+    let made = (entry.make)(&values);
+    (values, made)
+}
+
 #[cfg(test)]
 impl Entry {
     /// The first parameters as `given`, the others as where the deck leaves them out.

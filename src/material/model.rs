@@ -36,6 +36,48 @@ pub struct Response {
     pub dissipation: f64,
 }
 
+impl Response {
+    /// Without plastic flow: the tangent has `off` beside its diagonal, and there `two_mu` more.
+    #[inline(always)]
+    pub(super) fn elastic(
+        trial: [f64; 3],
+        stress: [f64; 3],
+        [off, two_mu]: [f64; 2],
+        state: [f64; MOST_STATE],
+    ) -> Self {
+        let mut tangent = [[off; 3]; 3];
+        for (a, row) in tangent.iter_mut().enumerate() {
+            row[a] += two_mu;
+        }
+        Response {
+            stress,
+            elastic_strain: trial,
+            tangent,
+            shear: [two_mu; 3],
+            state,
+            plastic_increment: 0.0,
+            dissipation: 0.0,
+        }
+    }
+
+    /// After a return to this stress.
+    #[inline(always)]
+    pub(super) fn returned(
+        trial: [f64; 3],
+        (stress, elastic_strain): ([f64; 3], [f64; 3]),
+        (tangent, shear): ([[f64; 3]; 3], [f64; 3]),
+        state: [f64; MOST_STATE],
+    ) -> Self {
+        let flow = [0, 1, 2].map(|a| trial[a] - elastic_strain[a]);
+        let (plastic_increment, dissipation) = (dot(flow, flow).sqrt(), dot(stress, flow));
+        Response { stress, elastic_strain, tangent, shear, state, plastic_increment, dissipation }
+    }
+}
+
+pub(super) fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
 /// Why parameters do not fit each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Misfit {
@@ -138,3 +180,23 @@ macro_rules! elastic_by {
     };
 }
 pub(super) use elastic_by;
+
+/// What a cone or pyramid answers whose strength stays, or changes with its first state variable.
+macro_rules! perfect_or_changing {
+    () => {
+        const STATE: &'static [StateVariable] = &[softening::KAPPA];
+
+        fn state_words(&self) -> usize {
+            usize::from(self.change.is_some())
+        }
+
+        #[inline]
+        fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
+            match &self.change {
+                None => self.respond_perfectly(trial),
+                Some(change) => self.respond_changing(change, trial, state[0]),
+            }
+        }
+    };
+}
+pub(super) use perfect_or_changing;

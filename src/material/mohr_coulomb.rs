@@ -12,7 +12,7 @@
 //! trial stress the return then changes with the planes, at the rate
 //! tau' = -D G' l - D G l', l' = (N D G)^-1 (N' tau - k' - N D G' l), l the multipliers.
 
-use super::model::elastic_by;
+use super::model::{dot, elastic_by, perfect_or_changing};
 use super::parameter::{Absence, POISSON, POSITIVE, Parameter, Range, YOUNG, at_least};
 use super::softening::{self, Change, check_hardening};
 use super::{Hencky, MOST_STATE, Misfit, Model, Response, StateVariable};
@@ -27,13 +27,11 @@ pub(super) const STIFF: Parameter = Parameter { range: POSITIVE, doc: "Young's m
 /// Degrees of an angle of friction or dilation.
 const ANGLE: Range = Range { high_included: false, ..super::parameter::between(0.0, 90.0) };
 
-pub(super) const FRICTION: Parameter =
-    Parameter::new("friction", "degrees", ANGLE, "Angle of friction phi.");
-pub(super) const DILATION: Parameter =
+const FRICTION: Parameter = Parameter::new("friction", "degrees", ANGLE, "Angle of friction phi.");
+const DILATION: Parameter =
     Parameter::new("dilation", "degrees", ANGLE, "Angle of dilation psi, at most the friction.")
         .absent(0.0, "0");
-pub(super) const COHESION: Parameter =
-    Parameter::new("cohesion", "Pa", at_least(0.0), "Cohesion c.");
+const COHESION: Parameter = Parameter::new("cohesion", "Pa", at_least(0.0), "Cohesion c.");
 const TENSION: Parameter = Parameter {
     absence: Absence::Means(f64::INFINITY, "no cut-off"),
     ..Parameter::new(
@@ -99,10 +97,6 @@ struct Returned {
     /// result is what the active planes were chosen for. Zero where all holds.
     misfit: f64,
     active: Active,
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 impl MohrCoulomb {
@@ -402,7 +396,6 @@ impl MohrCoulomb {
             slope.clamp(0.0, two_mu)
         });
         let elastic_strain = self.elasticity.strain(stress);
-        let flow = [0, 1, 2].map(|a| trial[a] - elastic_strain[a]);
         let mut rate = [0.0; 3];
         if let Some(rates) = rates {
             let sorted = self.stress_rate(sorted, &returned, rates);
@@ -410,16 +403,8 @@ impl MohrCoulomb {
                 rate[axis] = value;
             }
         }
-        let response = Response {
-            stress,
-            elastic_strain,
-            tangent,
-            shear,
-            state: [0.0; MOST_STATE],
-            plastic_increment: dot(flow, flow).sqrt(),
-            dissipation: dot(stress, flow),
-        };
-        (response, rate)
+        let (found, slopes) = ((stress, elastic_strain), (tangent, shear));
+        (Response::returned(trial, found, slopes, [0.0; MOST_STATE]), rate)
     }
 }
 
@@ -443,36 +428,15 @@ impl Model for MohrCoulomb {
     const DOC: &'static str = "Hencky elasticity with Mohr-Coulomb plasticity, perfect, softening or \
         hardening, non-associated where dilation differs from friction, and an optional tension cut-off \
         (associated).";
-    const PARAMETERS: &'static [Parameter] = &[
-        STIFF,
-        POISSON,
-        FRICTION,
-        DILATION,
-        COHESION,
-        TENSION,
-        softening::STRAIN,
-        softening::COHESION,
-        softening::FRICTION,
-        softening::DILATION,
-        softening::LENGTH,
-        softening::HARDENING,
-    ];
-    const STATE: &'static [StateVariable] = &[softening::KAPPA];
+    const PARAMETERS: &'static [Parameter] = &of_cone(TENSION);
 
     fn new(p: &[f64]) -> Self {
         let law = Self::with(Hencky::new(p[0], p[1]), p[2], p[3], p[4], p[5]);
-        law.changing(p[6], p[11], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])
-    }
-
-    fn state_words(&self) -> usize {
-        usize::from(self.change.is_some())
+        law.changing(p[6], p[11], ends_of_cone(p))
     }
 
     fn check(p: &[f64]) -> Result<(), Misfit> {
-        check_cone(p[2], p[3], p[4])?;
-        check_hardening(p[6], p[11])?;
-        let [friction, _, cohesion] =
-            check_residual(p[6], [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]])?;
+        let [friction, _, cohesion] = check_parameters(p)?;
         let apex = (p[4] / p[2].to_radians().tan()).min(cohesion / friction.to_radians().tan());
         if p[5].is_finite() && p[2] > 0.0 && p[5] > apex {
             let why = format!(
@@ -485,14 +449,7 @@ impl Model for MohrCoulomb {
         Ok(())
     }
 
-    #[inline]
-    fn respond(&self, trial: [f64; 3], state: &[f64]) -> Response {
-        match &self.change {
-            None => self.respond_perfectly(trial),
-            Some(change) => self.respond_changing(change, trial, state[0]),
-        }
-    }
-
+    perfect_or_changing!();
     elastic_by!(elasticity);
 
     fn symmetric(&self) -> bool {
@@ -500,8 +457,38 @@ impl Model for MohrCoulomb {
     }
 }
 
+/// Parameters of a cone or pyramid with one of its own.
+pub(super) const fn of_cone(own: Parameter) -> [Parameter; 12] {
+    [
+        STIFF,
+        POISSON,
+        FRICTION,
+        DILATION,
+        COHESION,
+        own,
+        softening::STRAIN,
+        softening::COHESION,
+        softening::FRICTION,
+        softening::DILATION,
+        softening::LENGTH,
+        softening::HARDENING,
+    ]
+}
+
+/// Peak and residual values among them: of friction, dilation and cohesion.
+pub(super) fn ends_of_cone(p: &[f64]) -> [[f64; 2]; 3] {
+    [[p[2], p[8]], [p[3], p[9]], [p[4], p[7]]]
+}
+
+/// Whether they fit each other; the residual angles and cohesion.
+pub(super) fn check_parameters(p: &[f64]) -> Result<[f64; 3], Misfit> {
+    check_cone(p[2], p[3], p[4])?;
+    check_hardening(p[6], p[11])?;
+    check_residual(p[6], ends_of_cone(p))
+}
+
 /// Angles (degrees) and cohesion (Pa) of a cone or pyramid that can be one.
-pub(super) fn check_cone(friction: f64, dilation: f64, cohesion: f64) -> Result<(), Misfit> {
+fn check_cone(friction: f64, dilation: f64, cohesion: f64) -> Result<(), Misfit> {
     if friction == 0.0 && cohesion == 0.0 {
         let why = "friction and cohesion are both zero: the material has no strength; expected \
                    cohesion > 0 Pa or friction > 0 degrees";

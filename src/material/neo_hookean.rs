@@ -4,7 +4,7 @@
 
 use super::mohr_coulomb::STIFF;
 use super::parameter::{POISSON, Parameter};
-use super::{MOST_STATE, Misfit, Model, Response};
+use super::{Hencky, MOST_STATE, Misfit, Model, Response};
 
 /// Largest number of Newton steps from stress to strain.
 const MOST_ITERATIONS: usize = 100;
@@ -50,12 +50,8 @@ impl Model for NeoHookean {
     }
 
     fn new(p: &[f64]) -> Self {
-        let (young, poisson) = (p[0], p[1]);
-        NeoHookean {
-            lambda: young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
-            mu: young / (2.0 * (1.0 + poisson)),
-            young,
-        }
+        let Hencky { lambda, mu, young } = Hencky::new(p[0], p[1]);
+        NeoHookean { lambda, mu, young }
     }
 
     #[inline(never)]

@@ -10,6 +10,7 @@
 //! cells, strain length / h. That keeps the energy of a band; it does not keep its place or direction
 //! from following the cells.
 
+use super::model::dot;
 use super::parameter::{Absence, Parameter, at_least};
 use super::{Hencky, Misfit, Response, StateVariable};
 
@@ -207,8 +208,4 @@ fn flow(trial: [f64; 3], response: &Response) -> (f64, [f64; 3]) {
 /// Δ_κ
 fn growth(elasticity: &Hencky, (_, rate): &(Response, [f64; 3]), direction: [f64; 3]) -> f64 {
     -dot(direction, elasticity.strain(*rate))
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

@@ -3,21 +3,9 @@
 #![allow(clippy::needless_range_loop, reason = "tensor formulas read by their indices")]
 
 use super::tests::tangent_error;
-use super::{CATALOGUE, Material, Response};
+use super::{CATALOGUE, Material, Response, law};
 
 const YOUNG: f64 = 1e5;
-
-/// A law of the catalogue with parameters by key.
-fn law(name: &str, given: &[(&str, f64)]) -> (Vec<f64>, Material) {
-    let entry = CATALOGUE.iter().find(|entry| entry.name == name).expect("a law");
-    let value = |key: &str| given.iter().find(|(own, _)| *own == key).map(|(_, value)| *value);
-    let parameters = entry.parameters.iter();
-    let values: Vec<f64> = parameters
-        .map(|known| value(known.key).unwrap_or_else(|| known.value_if_absent()))
-        .collect();
-    let made = (entry.make)(&values);
-    (values, made)
-}
 
 fn laws() -> Vec<Material> {
     let elastic = [("young", YOUNG), ("poisson", 0.3)];
@@ -45,19 +33,21 @@ fn laws() -> Vec<Material> {
         with("drucker-prager", &[]),
         with("drucker-prager", &[("fit", 1.0)]),
         with("drucker-prager", &[("fit", 2.0)]),
-        law(
-            "tresca",
-            &[
-                elastic[0],
-                elastic[1],
-                ("shear_strength", 10.0),
-                ("softening.strain", 0.02),
-                ("softening.cohesion", 4.0),
-                ("softening.length", 0.1),
-            ],
-        )
-        .1,
+        clay(0.02),
     ]
+}
+
+/// Tresca's, whose strength of 10 Pa falls to 4 Pa over this strain.
+fn clay(strain: f64) -> Material {
+    let given = [
+        ("young", YOUNG),
+        ("poisson", 0.3),
+        ("shear_strength", 10.0),
+        ("softening.strain", strain),
+        ("softening.cohesion", 4.0),
+        ("softening.length", 0.1),
+    ];
+    law("tresca", &given).1
 }
 
 /// States in planes, edges, apex and cut-off.
@@ -95,17 +85,7 @@ fn tangents_are_those_of_differences() {
 /// of the state's own values.
 #[test]
 fn the_stress_is_that_of_the_fallen_strength() {
-    let (_, law) = law(
-        "tresca",
-        &[
-            ("young", YOUNG),
-            ("poisson", 0.3),
-            ("shear_strength", 10.0),
-            ("softening.strain", 0.02),
-            ("softening.cohesion", 4.0),
-            ("softening.length", 0.1),
-        ],
-    );
+    let law = clay(0.02);
     let mut state = 0.0;
     let mut strain = [0.0; 3];
     let mut strengths = Vec::new();
@@ -163,17 +143,7 @@ fn cohesion_grows_with_the_plastic_strain() {
 /// A fall steeper than the elasticity can follow still ends on the surface.
 #[test]
 fn a_steep_fall_ends_at_the_residual_strength() {
-    let (_, law) = law(
-        "tresca",
-        &[
-            ("young", YOUNG),
-            ("poisson", 0.3),
-            ("shear_strength", 10.0),
-            ("softening.strain", 1e-6),
-            ("softening.cohesion", 4.0),
-            ("softening.length", 0.1),
-        ],
-    );
+    let law = clay(1e-6);
     let response = law.respond([2e-4, 0.0, -2e-4], &[0.0]);
     assert!((0.5 * (response.stress[0] - response.stress[2]) - 4.0).abs() < 1e-9);
 }

@@ -10,8 +10,13 @@ use mpi::traits::{Communicator, CommunicatorCollectives, Root};
 use super::sys;
 use crate::error::{Error, Result};
 
-/// Calls a PETSc function and turns its return code into a `Result`.
+/// Calls a PETSc function and turns its return code into a `Result`. After `->` stands what its last
+/// argument, the place of an answer, holds before; the answer is the result's value.
 macro_rules! petsc {
+    ($function:ident($($argument:expr),* $(,)?) -> $before:expr) => {{
+        let mut answer = $before;
+        $crate::petsc::check::petsc!($function($($argument,)* &mut answer)).map(|()| answer)
+    }};
     ($function:ident($($argument:expr),* $(,)?)) => {
         $crate::petsc::check::check(
             // SAFETY: the caller of the macro guarantees live handles and valid pointers.
@@ -74,8 +79,9 @@ pub(crate) fn essence(error: &Error) -> String {
     text.split(" (in ").next().unwrap_or(text).lines().next().unwrap_or(text).trim().to_string()
 }
 
-/// The return code of a callback of our own that failed; the text is there for the caller of PETSc.
-pub(crate) fn keep(error: &Error) -> sys::PetscErrorCode {
+/// The return code of a callback of our own; the text of a failure is there for the caller of PETSc.
+pub(crate) fn code_of(outcome: Result<()>) -> sys::PetscErrorCode {
+    let Err(error) = outcome else { return 0 };
     if let Ok(mut message) = MESSAGE.lock() {
         *message = error.to_string();
     }

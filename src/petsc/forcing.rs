@@ -91,14 +91,12 @@ const TRUE_NORM: [&str; 4] = ["cg", "gmres", "fgmres", "bcgs"];
 /// user is a fixed tolerance, unless `snes_ksp_ew` is given too. PETSc's own rule is off from here on:
 /// newer versions have hooks of their own for it, and would set their tolerances over ours.
 pub(crate) fn chosen(snes: sys::SNES, prefix: &str) -> Result<Option<Forcing>> {
-    let (mut inner, mut kind, mut used) = (null_mut(), null(), sys::PETSC_FALSE);
-    petsc!(SNESKSPGetUseEW(snes, &mut used))?;
+    let used = petsc!(SNESKSPGetUseEW(snes) -> sys::PETSC_FALSE)?;
     petsc!(SNESKSPSetUseEW(snes, sys::PETSC_FALSE))?;
-    petsc!(SNESGetKSP(snes, &mut inner))?;
-    petsc!(KSPGetType(inner, &mut kind))?;
+    let inner = petsc!(SNESGetKSP(snes) -> null_mut())?;
     let fixed = options::is_users(&format!("{prefix}ksp_rtol"))?
         && !options::is_users(&format!("{prefix}snes_ksp_ew"))?;
-    let kind = text_of(kind);
+    let kind = text_of(petsc!(KSPGetType(inner) -> null())?);
     if used == sys::PETSC_FALSE || fixed || kind == "preonly" {
         return Ok(None);
     }

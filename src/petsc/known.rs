@@ -8,6 +8,7 @@
 use std::ptr::null_mut;
 
 use super::check::{c_text, essence, free, petsc, text_of};
+use super::object::Object;
 use super::{options, sys};
 use crate::deck::PETSC_PREFIXES as PREFIXES;
 use crate::error::{Error, Result};
@@ -290,26 +291,20 @@ fn world() -> sys::MPI_Comm {
 
 fn newton() -> Result<()> {
     let prefix = c_text(PROBE)?;
-    let mut snes = null_mut();
-    petsc!(SNESCreate(world(), &mut snes))?;
-    let outcome = petsc!(SNESSetOptionsPrefix(snes, prefix.as_ptr()))
-        .and_then(|()| petsc!(SNESSetType(snes, sys::SNESNEWTONLS.as_ptr().cast())))
-        .and_then(|()| petsc!(SNESSetFromOptions(snes)));
-    petsc!(SNESDestroy(&mut snes))?;
-    outcome
+    let snes = Object(petsc!(SNESCreate(world()) -> null_mut())?);
+    petsc!(SNESSetOptionsPrefix(snes.0, prefix.as_ptr()))?;
+    petsc!(SNESSetType(snes.0, sys::SNESNEWTONLS.as_ptr().cast()))?;
+    petsc!(SNESSetFromOptions(snes.0))
 }
 
 fn linear(method: &str, pc_type: &str) -> Result<()> {
     let (prefix, method, pc_name) = (c_text(PROBE)?, c_text(method)?, c_text(pc_type)?);
-    let (mut ksp, mut pc) = (null_mut(), null_mut());
-    petsc!(KSPCreate(world(), &mut ksp))?;
-    let outcome = petsc!(KSPSetOptionsPrefix(ksp, prefix.as_ptr()))
-        .and_then(|()| petsc!(KSPSetType(ksp, method.as_ptr())))
-        .and_then(|()| petsc!(KSPGetPC(ksp, &mut pc)))
-        .and_then(|()| petsc!(PCSetType(pc, pc_name.as_ptr())))
-        .and_then(|()| petsc!(KSPSetFromOptions(ksp)));
-    petsc!(KSPDestroy(&mut ksp))?;
-    outcome
+    let ksp = Object(petsc!(KSPCreate(world()) -> null_mut())?);
+    petsc!(KSPSetOptionsPrefix(ksp.0, prefix.as_ptr()))?;
+    petsc!(KSPSetType(ksp.0, method.as_ptr()))?;
+    let pc = petsc!(KSPGetPC(ksp.0) -> null_mut())?;
+    petsc!(PCSetType(pc, pc_name.as_ptr()))?;
+    petsc!(KSPSetFromOptions(ksp.0))
 }
 
 #[cfg(test)]

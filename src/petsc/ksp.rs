@@ -7,7 +7,8 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
 use super::abort::unless_shared;
-use super::check::{agree, c_text, petsc, require_running, running, text_of};
+use super::check::{agree, c_text, petsc, require_running, text_of};
+use super::object::owned;
 use super::{Matrix, Vector, sys};
 use crate::error::{Error, Result};
 
@@ -133,22 +134,14 @@ impl Ksp {
     }
 }
 
-impl Drop for Ksp {
-    fn drop(&mut self) {
-        if !self.raw.is_null() && running() {
-            // SAFETY: this is the only owner of the handle.
-            unsafe { sys::KSPDestroy(&mut self.raw) };
-        }
-    }
-}
+owned!(Ksp);
 
 /// Drops all that belongs to the old matrix, so that one of another size can follow. A reset is
 /// not enough: GAMG would keep its levels. The preconditioner is made anew from its options.
 pub(crate) fn forget(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<()> {
     petsc!(KSPReset(ksp))?;
-    let (mut pc, mut kind) = (null_mut(), null());
-    petsc!(KSPGetPC(ksp, &mut pc))?;
-    petsc!(PCGetType(pc, &mut kind))?;
+    let pc = petsc!(KSPGetPC(ksp) -> null_mut())?;
+    let kind = petsc!(PCGetType(pc) -> null())?;
     if kind.is_null() {
         return Ok(());
     }
@@ -196,18 +189,15 @@ pub(crate) fn outcome(ksp: sys::KSP, comm: &SimpleCommunicator) -> Result<(KspOu
 }
 
 fn reason_of(ksp: sys::KSP) -> Result<sys::KSPConvergedReason> {
-    let mut reason = 0;
-    petsc!(KSPGetConvergedReason(ksp, &mut reason))?;
-    Ok(reason)
+    petsc!(KSPGetConvergedReason(ksp) -> 0)
 }
 
 /// As this rank sees it.
 fn outcome_here(ksp: sys::KSP) -> Result<KspOutcome> {
-    let (mut iterations, mut norm, mut text) = (0, 0.0, null());
     let reason = reason_of(ksp)?;
-    petsc!(KSPGetConvergedReasonString(ksp, &mut text))?;
-    petsc!(KSPGetIterationNumber(ksp, &mut iterations))?;
-    petsc!(KSPGetResidualNorm(ksp, &mut norm))?;
+    let text = petsc!(KSPGetConvergedReasonString(ksp) -> null())?;
+    let iterations = petsc!(KSPGetIterationNumber(ksp) -> 0)?;
+    let norm = petsc!(KSPGetResidualNorm(ksp) -> 0.0)?;
     Ok(KspOutcome {
         iterations: iterations.max(0) as usize,
         converged: reason > 0,
@@ -222,8 +212,7 @@ fn failure_here(ksp: sys::KSP) -> Result<(KspOutcome, bool)> {
     if reason_of(ksp)? != sys::KSP_DIVERGED_PC_FAILED {
         return Ok((outcome, false));
     }
-    let mut pc = null_mut();
-    petsc!(KSPGetPC(ksp, &mut pc))?;
+    let pc = petsc!(KSPGetPC(ksp) -> null_mut())?;
     let cause = pc_failure(pc)?;
     outcome.reason = format!("{} ({})", outcome.reason, name_of(cause));
     Ok((outcome, cause != sys::PC_SUBPC_ERROR))
@@ -242,14 +231,12 @@ fn name_of(reason: sys::PCFailedReason) -> &'static str {
 
 /// Why a preconditioner failed on this rank; of solvers inside solvers the innermost.
 fn pc_failure(pc: sys::PC) -> Result<sys::PCFailedReason> {
-    let mut reason = sys::PC_NOERROR;
-    petsc!(PCGetFailedReason(pc, &mut reason))?;
+    let reason = petsc!(PCGetFailedReason(pc) -> sys::PC_NOERROR)?;
     if reason != sys::PC_SUBPC_ERROR {
         return Ok(reason);
     }
     for inner in solvers_inside(pc)? {
-        let mut pc = null_mut();
-        petsc!(KSPGetPC(inner, &mut pc))?;
+        let pc = petsc!(KSPGetPC(inner) -> null_mut())?;
         let cause = pc_failure(pc)?;
         if cause != sys::PC_NOERROR {
             return Ok(cause);
@@ -260,9 +247,9 @@ fn pc_failure(pc: sys::PC) -> Result<sys::PCFailedReason> {
 
 /// This rank's solvers that a preconditioner of a common kind works with.
 fn solvers_inside(pc: sys::PC) -> Result<Vec<sys::KSP>> {
-    let (mut kind, mut one) = (null(), null_mut());
+    let mut one = null_mut();
     let (mut count, mut several) = (0, null_mut());
-    petsc!(PCGetType(pc, &mut kind))?;
+    let kind = petsc!(PCGetType(pc) -> null())?;
     match text_of(kind).as_str() {
         "telescope" => petsc!(PCTelescopeGetKSP(pc, &mut one))?,
         "redundant" => petsc!(PCRedundantGetKSP(pc, &mut one))?,
@@ -280,13 +267,11 @@ fn solvers_inside(pc: sys::PC) -> Result<Vec<sys::KSP>> {
 }
 
 pub(crate) fn describe(ksp: sys::KSP) -> Result<String> {
-    let (mut method, mut pc, mut pc_type) = (null(), null_mut(), null());
-    petsc!(KSPGetType(ksp, &mut method))?;
-    petsc!(KSPGetPC(ksp, &mut pc))?;
-    petsc!(PCGetType(pc, &mut pc_type))?;
+    let method = petsc!(KSPGetType(ksp) -> null())?;
+    let pc = petsc!(KSPGetPC(ksp) -> null_mut())?;
+    let pc_type = petsc!(PCGetType(pc) -> null())?;
     let mut text = format!("{} + {}", text_of(method), text_of(pc_type));
-    let mut solver = null();
-    petsc!(PCFactorGetMatSolverType(pc, &mut solver))?;
+    let solver = petsc!(PCFactorGetMatSolverType(pc) -> null())?;
     if !solver.is_null() {
         text = format!("{text} ({})", text_of(solver));
     }

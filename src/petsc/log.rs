@@ -54,8 +54,7 @@ impl Stages {
     /// Collective; once per session.
     pub fn register() -> Result<Self> {
         require_running()?;
-        let mut logging = sys::PETSC_FALSE;
-        petsc!(PetscLogIsActive(&mut logging))?;
+        let logging = petsc!(PetscLogIsActive() -> sys::PETSC_FALSE)?;
         if logging == sys::PETSC_FALSE {
             return Ok(Stages(None));
         }

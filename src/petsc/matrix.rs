@@ -12,7 +12,8 @@ use mpi::collective::SystemOperation;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, CommunicatorCollectives};
 
-use super::check::{agree, bool_of, petsc, require_running, running};
+use super::check::{agree, bool_of, petsc, require_running};
+use super::object::owned;
 use super::sys;
 use super::vector::DETERMINE;
 use super::vector::{Index, Vector, index};
@@ -254,8 +255,7 @@ impl Matrix {
         }
         let mut positions = self.vector()?;
         positions.values_mut()?.copy_from_slice(coordinates);
-        let mut modes = null_mut();
-        petsc!(MatNullSpaceCreateRigidBody(positions.raw(), &mut modes))?;
+        let mut modes = petsc!(MatNullSpaceCreateRigidBody(positions.raw()) -> null_mut())?;
         petsc!(MatSetNearNullSpace(self.raw, modes))?;
         petsc!(MatNullSpaceDestroy(&mut modes))
     }
@@ -267,8 +267,7 @@ impl Matrix {
 
     /// Zero vector with the layout of the rows.
     pub fn vector(&self) -> Result<Vector> {
-        let mut left = null_mut();
-        petsc!(MatCreateVecs(self.raw, null_mut(), &mut left))?;
+        let left = petsc!(MatCreateVecs(self.raw, null_mut()) -> null_mut())?;
         Vector::own(left, self.rows)
     }
 
@@ -291,8 +290,7 @@ impl Matrix {
 
     /// A number that grows with every change of the values.
     pub(crate) fn state(&self) -> Result<u64> {
-        let mut state = 0;
-        petsc!(PetscObjectStateGet(self.raw.cast(), &mut state))?;
+        let state = petsc!(PetscObjectStateGet(self.raw.cast()) -> 0)?;
         Ok(state as u64)
     }
 
@@ -305,14 +303,7 @@ impl Matrix {
     }
 }
 
-impl Drop for Matrix {
-    fn drop(&mut self) {
-        if !self.raw.is_null() && running() {
-            // SAFETY: this is the only owner of the handle; solvers hold their own references.
-            unsafe { sys::MatDestroy(&mut self.raw) };
-        }
-    }
-}
+owned!(Matrix);
 
 /// The array of stored values of a sequential matrix, to be overwritten while the [`Matrix`] that
 /// holds it is borrowed.
@@ -326,8 +317,7 @@ pub struct Entries<'a> {
 impl Entries<'_> {
     fn of(raw: sys::Mat) -> Result<Self> {
         let count = stored(raw)?;
-        let mut pointer = null_mut();
-        petsc!(MatSeqAIJGetArray(raw, &mut pointer))?;
+        let pointer = petsc!(MatSeqAIJGetArray(raw) -> null_mut())?;
         Ok(Entries { raw, pointer, count, owner: PhantomData })
     }
 }

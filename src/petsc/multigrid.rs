@@ -31,14 +31,11 @@ pub(crate) fn is_wanted(solver: &Ksp) -> Result<bool> {
 }
 
 fn preconditioner(solver: &Ksp) -> Result<sys::PC> {
-    let mut pc = null_mut();
-    petsc!(KSPGetPC(solver.raw(), &mut pc))?;
-    Ok(pc)
+    petsc!(KSPGetPC(solver.raw()) -> null_mut())
 }
 
 pub(super) fn is_type(pc: sys::PC, kind: &[u8]) -> Result<bool> {
-    let mut same = sys::PETSC_FALSE;
-    petsc!(PetscObjectTypeCompare(pc.cast(), kind.as_ptr().cast(), &mut same))?;
+    let same = petsc!(PetscObjectTypeCompare(pc.cast(), kind.as_ptr().cast()) -> sys::PETSC_FALSE)?;
     Ok(same != sys::PETSC_FALSE)
 }
 
@@ -70,10 +67,9 @@ fn put_level<P: Product, S: Smoother>(
     level: &Level<P>,
     own: Option<S>,
 ) -> Result<()> {
-    let (mut chebyshev, mut inner) = (null_mut(), null_mut());
-    petsc!(PCMGGetSmoother(pc, number, &mut chebyshev))?;
+    let chebyshev = petsc!(PCMGGetSmoother(pc, number) -> null_mut())?;
     petsc!(KSPSetType(chebyshev, sys::KSPCHEBYSHEV.as_ptr().cast()))?;
-    petsc!(KSPGetPC(chebyshev, &mut inner))?;
+    let inner = petsc!(KSPGetPC(chebyshev) -> null_mut())?;
     match own {
         Some(own) => smoother::put(inner, own)?,
         None => petsc!(PCSetType(inner, sys::PCJACOBI.as_ptr().cast()))?,
@@ -97,16 +93,14 @@ fn put_level<P: Product, S: Smoother>(
 
 /// Solved by factors: on the rank that has all of it, else by PETSc's default, a copy for each.
 fn put_coarsest(solver: &Ksp, pc: sys::PC, matrix: &Matrix) -> Result<()> {
-    let mut coarse = null_mut();
-    petsc!(PCMGGetCoarseSolve(pc, &mut coarse))?;
+    let coarse = petsc!(PCMGGetCoarseSolve(pc) -> null_mut())?;
     petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))?;
     let (comm, mut holders) = (solver.comm(), 0);
     comm.all_reduce_into(&i32::from(matrix.rows_local() > 0), &mut holders, SystemOperation::sum());
     if holders == 1 && comm.size() > 1 {
-        let (mut inner, mut prefix) = (null_mut(), null());
-        petsc!(KSPGetPC(coarse, &mut inner))?;
+        let inner = petsc!(KSPGetPC(coarse) -> null_mut())?;
         petsc!(PCSetType(inner, sys::PCBJACOBI.as_ptr().cast()))?;
-        petsc!(KSPGetOptionsPrefix(coarse, &mut prefix))?;
+        let prefix = petsc!(KSPGetOptionsPrefix(coarse) -> null())?;
         set_default(&format!("{}sub_pc_type", text_of(prefix)), "lu")?;
     }
     Ok(())
@@ -139,7 +133,6 @@ pub(crate) fn multiply_by<P: Product>(
 
 /// Whether the user's lag says that the preconditioner of an earlier matrix shall serve on.
 pub(crate) fn is_kept(solver: &Ksp) -> Result<bool> {
-    let mut kept = sys::PETSC_FALSE;
-    petsc!(KSPGetReusePreconditioner(solver.raw(), &mut kept))?;
+    let kept = petsc!(KSPGetReusePreconditioner(solver.raw()) -> sys::PETSC_FALSE)?;
     Ok(kept != sys::PETSC_FALSE)
 }

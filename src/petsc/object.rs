@@ -19,14 +19,30 @@ macro_rules! handles {
         })*
     };
 }
-handles!(sys::Mat, sys::Vec, sys::IS, sys::VecScatter);
+handles!(sys::Mat, sys::Vec, sys::IS, sys::VecScatter, sys::KSP, sys::SNES);
 
 impl<T: Handle> Drop for Object<T> {
     fn drop(&mut self) {
-        let mut object = self.0.object();
-        if !object.is_null() && running() {
-            // SAFETY: this reference is ours.
-            unsafe { sys::PetscObjectDestroy(&mut object) };
+        give_back(self.0.object());
+    }
+}
+
+/// The reference that an owner has in its field `raw` goes with it.
+macro_rules! owned {
+    ($owner:ty) => {
+        impl Drop for $owner {
+            fn drop(&mut self) {
+                $crate::petsc::object::give_back(self.raw.cast());
+            }
         }
+    };
+}
+pub(crate) use owned;
+
+/// Gives back one reference, which nobody uses from here on; null is none.
+pub(crate) fn give_back(mut object: sys::PetscObject) {
+    if !object.is_null() && running() {
+        // SAFETY: the reference was the caller's.
+        unsafe { sys::PetscObjectDestroy(&mut object) };
     }
 }

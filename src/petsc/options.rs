@@ -47,8 +47,7 @@ pub fn is_users(name: &str) -> Result<bool> {
 /// The whole database as PETSc prints it.
 fn all() -> Result<String> {
     require_running()?;
-    let mut text = null_mut();
-    petsc!(PetscOptionsGetAll(null_mut(), &mut text))?;
+    let text = petsc!(PetscOptionsGetAll(null_mut()) -> null_mut())?;
     let all = text_of(text);
     free(text);
     Ok(all)
@@ -58,8 +57,8 @@ fn all() -> Result<String> {
 pub fn get(name: &str) -> Result<Option<String>> {
     require_running()?;
     let key = c_text(&dashed(name))?;
-    let (mut value, mut found) = (null(), sys::PETSC_FALSE);
-    petsc!(PetscOptionsFindPair(null_mut(), null(), key.as_ptr(), &mut value, &mut found))?;
+    let mut value = null();
+    let found = petsc!(PetscOptionsFindPair(null_mut(), null(), key.as_ptr(), &mut value) -> sys::PETSC_FALSE)?;
     Ok((found != sys::PETSC_FALSE).then(|| text_of(value)))
 }
 

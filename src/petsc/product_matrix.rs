@@ -7,7 +7,7 @@ use std::ptr::null_mut;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::AsRaw;
 
-use super::check::{keep, petsc};
+use super::check::{code_of, petsc};
 use super::object::Object;
 use super::sys;
 use super::vector::DETERMINE;
@@ -242,11 +242,10 @@ fn with_context<P>(
     act: impl FnOnce(&Context<P>) -> Result<()>,
 ) -> sys::PetscErrorCode {
     let mut data: *mut c_void = null_mut();
-    let outcome = petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
+    code_of(petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
         // SAFETY: the box that `ProductMatrix::new` gave up lives as long as the shell.
         act(unsafe { &*data.cast::<Context<P>>() })
-    });
-    outcome.map_or_else(|error| keep(&error), |()| 0)
+    }))
 }
 
 unsafe extern "C" fn destroy<P>(data: sys::Destroyed) -> sys::PetscErrorCode {

@@ -37,9 +37,8 @@ impl<'u> Session<'u> {
         table: &[(String, String)],
         words: &[String],
     ) -> Result<Self> {
-        let (mut started, mut ended) = (sys::PETSC_FALSE, sys::PETSC_FALSE);
-        petsc!(PetscInitialized(&mut started))?;
-        petsc!(PetscFinalized(&mut ended))?;
+        let started = petsc!(PetscInitialized() -> sys::PETSC_FALSE)?;
+        let ended = petsc!(PetscFinalized() -> sys::PETSC_FALSE)?;
         if started != sys::PETSC_FALSE || ended != sys::PETSC_FALSE {
             return Err(Error::Environment("PETSc can be started only once per process".into()));
         }

@@ -8,7 +8,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::AsRaw;
 
 use super::abort::unless_shared;
-use super::check::{keep, petsc, text_of};
+use super::check::{code_of, petsc, text_of};
 use super::ksp::{self, Ksp, KspOutcome};
 use super::object::Object;
 use super::vector::DETERMINE;
@@ -52,9 +52,8 @@ struct Space {
 impl ShellKsp {
     /// `ksp` has read its options; those that leave `pc_type` at `shell` get our preconditioner.
     pub fn new(ksp: Ksp) -> Result<Self> {
-        let (mut pc, mut kind) = (null_mut(), null());
-        petsc!(KSPGetPC(ksp.raw(), &mut pc))?;
-        petsc!(PCGetType(pc, &mut kind))?;
+        let pc = petsc!(KSPGetPC(ksp.raw()) -> null_mut())?;
+        let kind = petsc!(PCGetType(pc) -> null())?;
         Ok(ShellKsp { ksp, ours: text_of(kind) == "shell", space: None })
     }
 
@@ -99,8 +98,7 @@ impl ShellKsp {
         let product = unsafe { std::mem::transmute::<Apply, sys::AnyFunction>(multiply::<S>) };
         petsc!(MatShellSetOperation(space.product.0, sys::MATOP_MULT, Some(product)))?;
         if self.ours {
-            let mut pc = null_mut();
-            petsc!(KSPGetPC(raw, &mut pc))?;
+            let pc = petsc!(KSPGetPC(raw) -> null_mut())?;
             petsc!(PCShellSetContext(pc, data))?;
             petsc!(PCShellSetApply(pc, Some(precondition::<S>)))?;
             petsc!(PCShellSetName(pc, system.preconditioner().as_ptr()))?;
@@ -136,7 +134,7 @@ unsafe extern "C" fn multiply<S: ShellSystem>(
     y: sys::Vec,
 ) -> sys::PetscErrorCode {
     let mut data: *mut c_void = null_mut();
-    code(petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
+    code_of(petsc!(MatShellGetContext(shell, (&raw mut data).cast())).and_then(|()| {
         // SAFETY: the system that `solve` borrows, of the type it set this function for; PETSc's
         // vectors live through the call and are distinct, as `MatMult` asks.
         let (system, x, mut y) =
@@ -151,14 +149,10 @@ unsafe extern "C" fn precondition<S: ShellSystem>(
     z: sys::Vec,
 ) -> sys::PetscErrorCode {
     let mut data: *mut c_void = null_mut();
-    code(petsc!(PCShellGetContext(pc, (&raw mut data).cast())).and_then(|()| {
+    code_of(petsc!(PCShellGetContext(pc, (&raw mut data).cast())).and_then(|()| {
         // SAFETY: as in `multiply`.
         let (system, r, mut z) =
             unsafe { (&mut *data.cast::<S>(), LocalValues::of(r)?, LocalValuesMut::of(z)?) };
         system.precondition(&r, &mut z)
     }))
-}
-
-fn code(outcome: Result<()>) -> sys::PetscErrorCode {
-    outcome.map_or_else(|error| keep(&error), |()| 0)
 }

@@ -3,7 +3,7 @@
 use std::ffi::c_void;
 use std::ptr::null_mut;
 
-use super::check::{keep, petsc};
+use super::check::{code_of, petsc};
 use super::multigrid::is_type;
 use super::sys;
 use super::vector::{LocalValues, LocalValuesMut};
@@ -62,7 +62,7 @@ unsafe extern "C" fn apply<S: Smoother>(
             smoother.apply(&r, &mut z)
         })
     };
-    outcome.map_or_else(|error| keep(&error), |_| 0)
+    code_of(outcome.map(drop))
 }
 
 unsafe extern "C" fn destroy<S>(pc: sys::PC) -> sys::PetscErrorCode {
@@ -72,5 +72,5 @@ unsafe extern "C" fn destroy<S>(pc: sys::PC) -> sys::PetscErrorCode {
         // SAFETY: the box that `put` gave up, and PETSc calls this once.
         drop(unsafe { Box::from_raw(data.cast::<S>()) });
     }
-    found.map_or_else(|error| keep(&error), |()| 0)
+    code_of(found)
 }

@@ -12,9 +12,10 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::{AsRaw, Communicator, CommunicatorCollectives};
 
 use super::abort::unless_shared;
-use super::check::{agree, c_text, petsc, require_running, running, text_of};
+use super::check::{agree, c_text, petsc, require_running, text_of};
 use super::forcing::{self, Forcing};
 use super::ksp::{self, Ranks};
+use super::object::owned;
 use super::vector::DEFAULT;
 use super::vector::{Index, LocalValues, LocalValuesMut, index};
 use super::{Ksp, Matrix, Vector, sys};
@@ -148,12 +149,10 @@ impl Snes {
         let prefix = c_text(prefix)?;
         petsc!(SNESSetOptionsPrefix(snes.raw, prefix.as_ptr()))?;
         petsc!(SNESSetType(snes.raw, sys::SNESNEWTONLS.as_ptr().cast()))?;
-        let mut inner = null_mut();
-        petsc!(SNESGetKSP(snes.raw, &mut inner))?;
+        let inner = petsc!(SNESGetKSP(snes.raw) -> null_mut())?;
         petsc!(PetscObjectReference(inner.cast()))?;
         snes.solver.take_reference(inner);
-        let mut search = null_mut();
-        petsc!(SNESGetLineSearch(snes.raw, &mut search))?;
+        let search = petsc!(SNESGetLineSearch(snes.raw) -> null_mut())?;
         // Every version knows this word; the constant with it has changed its name.
         petsc!(SNESLineSearchSetType(search, c"basic".as_ptr()))?;
         snes.set_max_solves(max_solves)?;
@@ -279,9 +278,9 @@ impl Snes {
     /// Whether the last residual is zero to the last bit: there is no direction to search along, and
     /// PETSc's line searches take that for a failure.
     fn residual_is_zero(&self) -> Result<bool> {
-        let (mut f, mut norm) = (null_mut(), 0.0);
+        let mut f = null_mut();
         petsc!(SNESGetFunction(self.raw, &mut f, null_mut(), null_mut()))?;
-        petsc!(VecNorm(f, sys::NORM_2, &mut norm))?;
+        let norm = petsc!(VecNorm(f, sys::NORM_2) -> 0.0)?;
         Ok(norm == 0.0)
     }
 
@@ -294,14 +293,7 @@ impl Snes {
     }
 }
 
-impl Drop for Snes {
-    fn drop(&mut self) {
-        if !self.raw.is_null() && running() {
-            // SAFETY: this is the only owner of the handle.
-            unsafe { sys::SNESDestroy(&mut self.raw) };
-        }
-    }
-}
+owned!(Snes);
 
 impl<P: NewtonProblem> Context<'_, P> {
     /// Makes the ranks agree; an error is kept for `solve` and stops PETSc's loop.
@@ -474,8 +466,8 @@ fn judge<P: NewtonProblem>(
     snes: sys::SNES,
     iteration: usize,
 ) -> Result<Verdict> {
-    let (mut x, mut f) = (null_mut(), null_mut());
-    petsc!(SNESGetSolution(snes, &mut x))?;
+    let mut f = null_mut();
+    let x = petsc!(SNESGetSolution(snes) -> null_mut())?;
     petsc!(SNESGetFunction(snes, &mut f, null_mut(), null_mut()))?;
     // SAFETY: the solver's vectors live through the convergence test and nobody writes them.
     let (x, f) = unsafe { (LocalValues::of(x)?, LocalValues::of(f)?) };

@@ -6,7 +6,8 @@ use std::ptr::null_mut;
 use mpi::topology::SimpleCommunicator;
 use mpi::traits::AsRaw;
 
-use super::check::{petsc, require_running, running};
+use super::check::{petsc, require_running};
+use super::object::owned;
 use super::sys;
 use crate::error::{Error, Result};
 
@@ -88,34 +89,21 @@ impl Vector {
 
     /// Euclidean norm.
     pub fn norm(&self) -> Result<f64> {
-        let mut norm = 0.0;
-        petsc!(VecNorm(self.raw, sys::NORM_2, &mut norm))?;
-        Ok(norm)
+        petsc!(VecNorm(self.raw, sys::NORM_2) -> 0.0)
     }
 
     /// Largest magnitude.
     pub fn norm_max(&self) -> Result<f64> {
-        let mut norm = 0.0;
-        petsc!(VecNorm(self.raw, sys::NORM_INFINITY, &mut norm))?;
-        Ok(norm)
+        petsc!(VecNorm(self.raw, sys::NORM_INFINITY) -> 0.0)
     }
 
     /// Scalar product. Collective.
     pub fn dot(&self, other: &Vector) -> Result<f64> {
-        let mut dot = 0.0;
-        petsc!(VecDot(self.raw, other.raw, &mut dot))?;
-        Ok(dot)
+        petsc!(VecDot(self.raw, other.raw) -> 0.0)
     }
 }
 
-impl Drop for Vector {
-    fn drop(&mut self) {
-        if !self.raw.is_null() && running() {
-            // SAFETY: this is the only owner of the handle.
-            unsafe { sys::VecDestroy(&mut self.raw) };
-        }
-    }
-}
+owned!(Vector);
 
 /// Local values of a vector, read only.
 pub struct LocalValues<'v> {
@@ -133,10 +121,8 @@ impl<'v> LocalValues<'v> {
     /// # Safety
     /// `raw` stays alive, and nobody writes its values, while the guard lives.
     pub(crate) unsafe fn of(raw: sys::Vec) -> Result<Self> {
-        let mut count = 0;
-        petsc!(VecGetLocalSize(raw, &mut count))?;
-        let mut pointer = std::ptr::null();
-        petsc!(VecGetArrayRead(raw, &mut pointer))?;
+        let count = petsc!(VecGetLocalSize(raw) -> 0)?;
+        let pointer = petsc!(VecGetArrayRead(raw) -> std::ptr::null())?;
         let slice = if pointer.is_null() {
             &[][..]
         } else {
@@ -177,10 +163,8 @@ impl<'v> LocalValuesMut<'v> {
     /// # Safety
     /// `raw` stays alive, and nobody else touches its values, while the guard lives.
     pub(crate) unsafe fn of(raw: sys::Vec) -> Result<Self> {
-        let mut count = 0;
-        petsc!(VecGetLocalSize(raw, &mut count))?;
-        let mut pointer = null_mut();
-        petsc!(VecGetArray(raw, &mut pointer))?;
+        let count = petsc!(VecGetLocalSize(raw) -> 0)?;
+        let pointer = petsc!(VecGetArray(raw) -> null_mut())?;
         let slice = if pointer.is_null() {
             &mut [][..]
         } else {

@@ -95,7 +95,7 @@ fn cause(material: &Material) -> Option<Cause> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::material::{Hencky, Parameter, entry};
+    use crate::material::{Hencky, law};
 
     #[test]
     fn poisson_ratios_from_0_45_lock() {
@@ -109,15 +109,7 @@ mod tests {
 
     #[test]
     fn flow_at_constant_volume_locks() {
-        // What a deck that leaves the other keys out gets.
-        let made = |model: &str, given: &[(&str, f64)]| {
-            let entry = entry(model).expect("a model of the catalogue");
-            let value = |known: &Parameter| {
-                let given = given.iter().find(|(key, _)| *key == known.key);
-                given.map_or_else(|| known.value_if_absent(), |(_, value)| *value)
-            };
-            (entry.make)(&entry.parameters.iter().map(value).collect::<Vec<f64>>())
-        };
+        let made = |model: &str, given: &[(&str, f64)]| law(model, given).1;
         let elastic = [("young", 1e7), ("poisson", 0.3)];
         let sand = |dilation| {
             let soil = [("friction", 30.0), ("dilation", dilation), ("cohesion", 1e4)];

@@ -201,22 +201,19 @@ fn cells(layout: &HistoryColumns, row: &HistoryRow) -> Vec<(Column, f64)> {
     for (axis, value) in axes.iter().zip(row.angular_momentum) {
         cell(format!("angular_momentum_{axis}"), angular, value);
     }
-    for (index, name) in layout.boundaries.iter().enumerate() {
-        let reaction = row.reactions.get(index).copied().unwrap_or_default();
-        for (axis, value) in axes.iter().zip(reaction.force).take(layout.dimension) {
-            cell(format!("reaction.{name}.{axis}"), force, value);
+    let all = [(&layout.boundaries, &row.reactions, true), (&layout.rigids, &row.rigids, false)];
+    for (names, reactions, hold) in all {
+        for (index, name) in names.iter().enumerate() {
+            let reaction = reactions.get(index).copied().unwrap_or_default();
+            for (axis, value) in axes.iter().zip(reaction.force).take(layout.dimension) {
+                cell(format!("reaction.{name}.{axis}"), force, value);
+            }
+            cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
+            cell(format!("reaction.{name}.torque"), torque, reaction.torque);
+            if hold {
+                cell(format!("reaction.{name}.held"), unit("m3", "m2"), reaction.held);
+            }
         }
-        cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
-        cell(format!("reaction.{name}.torque"), torque, reaction.torque);
-        cell(format!("reaction.{name}.held"), unit("m3", "m2"), reaction.held);
-    }
-    for (index, name) in layout.rigids.iter().enumerate() {
-        let reaction = row.rigids.get(index).copied().unwrap_or_default();
-        for (axis, value) in axes.iter().zip(reaction.force).take(layout.dimension) {
-            cell(format!("reaction.{name}.{axis}"), force, value);
-        }
-        cell(format!("reaction.{name}.sum_abs"), force, reaction.sum_abs);
-        cell(format!("reaction.{name}.torque"), torque, reaction.torque);
     }
     for (index, ContactName { name, of_bodies }) in layout.contacts.iter().enumerate() {
         let state = row.contacts.get(index).copied().unwrap_or_default();
