@@ -37,6 +37,20 @@ pub struct Draft<const D: usize> {
 }
 
 impl<const D: usize> Draft<D> {
+    /// Without nodes.
+    pub fn new(name: String, element: Element) -> Self {
+        Draft {
+            name,
+            element,
+            positions: Vec::new(),
+            cells: Vec::new(),
+            node_labels: Vec::new(),
+            cell_labels: Vec::new(),
+            node_sets: BTreeMap::new(),
+            cell_sets: BTreeMap::new(),
+        }
+    }
+
     /// Checks everything and builds neighbours and bins. Errors name the cell or node by its
     /// number in the source, and its position.
     pub fn finish(self) -> Result<Mesh<D>> {

@@ -104,7 +104,7 @@ fn box_draft<const D: usize>(
             cells.extend(corners.map(|c| node(c) as u32));
         }
     }
-    Ok(draft(NAME, element, positions, cells, node_sets))
+    Ok(Draft { positions, cells, node_sets, ..Draft::new(NAME.into(), element) })
 }
 
 /// A disc of radius `outer` (m) with an elliptic hole of semi-axes `inner` (m) along x and y,
@@ -167,7 +167,7 @@ pub fn annulus<const D: usize>(
     }
     let ring = |ring: usize| (0..around).map(|s| (ring * around + s) as u32).collect();
     let node_sets = [("inner".to_string(), ring(0)), ("outer".to_string(), ring(radial))].into();
-    draft(NAME, element, positions, cells, node_sets).finish()
+    Draft { positions, cells, node_sets, ..Draft::new(NAME.into(), element) }.finish()
 }
 
 /// Nodes and cells are 32-bit numbers, with room for six simplices per node.
@@ -176,23 +176,4 @@ fn check_size(name: &str, nodes: usize) -> Result<()> {
         return Err(input(name, &format!("{nodes} nodes are too many for one mesh")));
     }
     Ok(())
-}
-
-fn draft<const D: usize>(
-    name: &str,
-    element: Element,
-    positions: Vec<[f64; D]>,
-    cells: Vec<u32>,
-    node_sets: BTreeMap<String, Vec<u32>>,
-) -> Draft<D> {
-    Draft {
-        name: name.to_string(),
-        element,
-        positions,
-        cells,
-        node_labels: Vec::new(),
-        cell_labels: Vec::new(),
-        node_sets,
-        cell_sets: BTreeMap::new(),
-    }
 }

@@ -4,7 +4,6 @@
 //! A group without a name is known by its number. Nodes of no cell are dropped. Cells that are
 //! listed clockwise (in 3D: left-handed) are turned.
 
-use std::collections::BTreeMap;
 use std::path::Path;
 
 use rustc_hash::FxHashMap;
@@ -114,16 +113,7 @@ fn draft<const D: usize>(contents: &Contents, element: Element, path: &Path) -> 
             return Err(wrong(path, format!("lists node {label} twice")));
         }
     }
-    let mut draft = Draft {
-        name: format!("mesh file {}", path.display()),
-        element,
-        positions: Vec::new(),
-        cells: Vec::new(),
-        node_labels: Vec::new(),
-        cell_labels: Vec::new(),
-        node_sets: BTreeMap::new(),
-        cell_sets: BTreeMap::new(),
-    };
+    let mut draft = Draft::new(format!("mesh file {}", path.display()), element);
 
     // Number the nodes of cells by ascending label, whatever the order of the cells.
     let cell_blocks = contents.blocks.iter().filter(|block| block.kind.dimension == D);

@@ -70,16 +70,8 @@ impl Manufactured {
         scope: &Scope,
     ) -> ([f64; D], Matrix3<f64>) {
         let jets: [Jet; D] = self.jets(scope);
-        let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
-        let state = &material.model().initial_state([0.0; 3])[..];
-        let start = StepStart {
-            material,
-            state,
-            deformation_gradient: &unit,
-            elastic_excess: &none,
-            volume_initial: 1.0,
-        };
-        let state = mechanics::stress(&start, &displacement_gradient(&jets));
+        let gradient = displacement_gradient(&jets);
+        let state = from_rest(material, |start| mechanics::stress(start, &gradient));
         (jets.map(|jet| jet.value), state.kirchhoff_stress)
     }
 
@@ -96,16 +88,8 @@ impl Manufactured {
     ) -> Result<[f64; D]> {
         let jets: [Jet; D] = self.jets(scope);
         let gradient = displacement_gradient(&jets);
-        let (unit, none) = (Matrix3::identity(), Matrix3::zeros());
-        let state = &material.model().initial_state([0.0; 3])[..];
-        let start = StepStart {
-            material,
-            state,
-            deformation_gradient: &unit,
-            elastic_excess: &none,
-            volume_initial: 1.0,
-        };
-        let (contribution, state) = mechanics::contribution(Frame::Total, &start, &gradient);
+        let (contribution, state) =
+            from_rest(material, |start| mechanics::contribution(Frame::Total, start, &gradient));
         if state.plastic_increment > 0.0 || !state.stored_energy.is_finite() {
             return Err(Error::Input(format!(
                 "at X = {:?}, s = {} the manufactured field {}; a manufactured solution must stay \
@@ -154,6 +138,17 @@ impl<const D: usize> Load<D> for Manufactured {
 }
 
 /// F - 1 = du/dX.
+/// What a step of a unit volume without strain comes to.
+fn from_rest<R>(material: LocalMaterial<'_>, step: impl FnOnce(&StepStart<'_>) -> R) -> R {
+    step(&StepStart {
+        material,
+        state: &material.model().initial_state([0.0; 3]),
+        deformation_gradient: &Matrix3::identity(),
+        elastic_excess: &Matrix3::zeros(),
+        volume_initial: 1.0,
+    })
+}
+
 fn displacement_gradient<const D: usize>(jets: &[Jet; D]) -> [[f64; D]; D] {
     std::array::from_fn(|k| std::array::from_fn(|l| jets[k].first[l]))
 }

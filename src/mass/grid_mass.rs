@@ -260,8 +260,5 @@ pub fn require_mass<const D: usize>(
             grid.node_position(numbering.nodes[node])
         )
     });
-    match world.first_message(message) {
-        Some(message) => Err(Error::Run(message)),
-        None => Ok(()),
-    }
+    world.refuse(Error::Run, message)
 }

@@ -138,7 +138,7 @@ fn write_series<const D: usize>(folder: &Path, basis: Basis, comm: &SimpleCommun
     }
     // A restart after step 0 forgets step 5 and writes it again.
     let mut series = create();
-    series.resume(0, &mut Log::silent(), comm).unwrap();
+    series.resume(0, &mut Log::default(), comm).unwrap();
     series.cut(comm).unwrap();
     series.write((5, 0.5), &points, comm).unwrap();
 

@@ -7,7 +7,7 @@ use mpi::topology::SimpleCommunicator;
 use mpi::traits::*;
 
 use super::traffic::reducing;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// All ranks of a run.
 pub struct World {
@@ -163,6 +163,16 @@ impl World {
         let mut bytes = message.unwrap_or_default().into_bytes();
         self.broadcast_bytes(speaker as usize, &mut bytes);
         Some(String::from_utf8_lossy(&bytes).into_owned())
+    }
+
+    /// Fails on all ranks with the message of the lowest rank that has one.
+    pub fn refuse(&self, kind: fn(String) -> Error, message: Option<String>) -> Result<()> {
+        self.first_message(message).map_or(Ok(()), |message| Err(kind(message)))
+    }
+
+    /// Fails on all ranks with the message of the lowest number: bad input.
+    pub fn refuse_lowest(&self, own: Option<(u64, String)>) -> Result<()> {
+        self.lowest_message(own).map_or(Ok(()), |message| Err(Error::Input(message)))
     }
 
     /// Fails on all ranks, with the error of the lowest failing rank, if it failed on any: call

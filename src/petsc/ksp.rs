@@ -124,6 +124,10 @@ impl Ksp {
         &self.comm
     }
 
+    pub(crate) fn prefix(&self) -> &str {
+        &self.prefix
+    }
+
     pub(crate) fn raw(&self) -> sys::KSP {
         self.raw
     }

@@ -101,7 +101,6 @@ pub struct NewtonOutcome {
 pub struct Snes {
     raw: sys::SNES,
     comm: SimpleCommunicator,
-    prefix: String,
     /// Matrix of the last solve.
     matrix: u64,
     /// Tolerances of an iterative linear solver, unless one is fixed.
@@ -143,8 +142,7 @@ impl Snes {
         require_running()?;
         let comm = comm.duplicate();
         let solver = Ksp::from_reference(null_mut(), &comm, prefix);
-        let (raw, prefix_text) = (null_mut(), prefix.into());
-        let mut snes = Snes { raw, comm, prefix: prefix_text, matrix: 0, forcing: None, solver };
+        let mut snes = Snes { raw: null_mut(), comm, matrix: 0, forcing: None, solver };
         petsc!(SNESCreate(snes.comm.as_raw(), &mut snes.raw))?;
         let prefix = c_text(prefix)?;
         petsc!(SNESSetOptionsPrefix(snes.raw, prefix.as_ptr()))?;
@@ -170,17 +168,14 @@ impl Snes {
     /// Built-in options under the prefix: pairs such as `("pc_type", "lu")`. The user's win.
     /// Call before [`Self::set_from_options`].
     pub fn set_defaults<V: AsRef<str>>(&self, options: &[(&str, V)]) -> Result<()> {
-        for (name, value) in options {
-            super::options::set_default(&format!("{}{name}", self.prefix), value.as_ref())?;
-        }
-        Ok(())
+        self.solver.set_defaults(options)
     }
 
     /// Reads the options under the prefix, those of the linear solver included.
     pub fn set_from_options(&mut self) -> Result<()> {
         forcing::set_default(self.raw)?;
         petsc!(SNESSetFromOptions(self.raw)).map_err(|error| unless_shared(&self.comm, error))?;
-        self.forcing = forcing::chosen(self.raw, &self.prefix)?;
+        self.forcing = forcing::chosen(self.raw, self.solver.prefix())?;
         Ok(())
     }
 

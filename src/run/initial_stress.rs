@@ -5,7 +5,7 @@ use nalgebra::Matrix3;
 
 use crate::deck::model::{InitialStress, K0, Water};
 use crate::deck::{Deck, Scope, figure};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::loads::scope_of;
 use crate::material::{Material, local};
 use crate::parallel::World;
@@ -41,7 +41,7 @@ pub fn set<const D: usize>(
             fault = Some((points.id[p], message_at(deck, points, p, &stress, why)));
         }
     }
-    world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))
+    world.refuse_lowest(fault)
 }
 
 /// An error, the same on all ranks, where the initial stress of a point lies outside the yield
@@ -84,7 +84,7 @@ pub fn require_elastic<const D: usize>(
         );
         (id, message_at(deck, points, p, &stress, &why))
     });
-    world.lowest_message(message).map_or(Ok(()), |message| Err(Error::Input(message)))
+    world.refuse_lowest(message)
 }
 
 /// A message about the initial stress of a point, with its place.

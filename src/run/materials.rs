@@ -57,7 +57,7 @@ pub fn equip<const D: usize>(
         }
         points.state.set(p, &state);
     }
-    world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))?;
+    world.refuse_lowest(fault)?;
     match stresses {
         Stresses::Initial => initial_stress::require_elastic(world, deck, materials, points),
         Stresses::Kept => Ok(()),
@@ -90,7 +90,7 @@ pub fn equip_restored<const D: usize>(
         let body = &deck.bodies[body as usize].name;
         format!("the checkpoint holds no `{name}` for body \"{body}\": it cannot be continued")
     });
-    world.first_message(message).map_or(Ok(()), |message| Err(Error::File(message)))
+    world.refuse(Error::File, message)
 }
 
 /// Names of the state variables of each body. Where a body's parameters vary in space its points carry all state
@@ -139,7 +139,7 @@ fn set_parameters<const D: usize>(
         }
         points.parameters.of_mut(p, body).copy_from_slice(&values);
     }
-    world.lowest_message(fault).map_or(Ok(()), |message| Err(Error::Input(message)))
+    world.refuse_lowest(fault)
 }
 
 /// The first parameter that is no good with the others, and why.

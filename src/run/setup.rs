@@ -295,10 +295,8 @@ fn check_bodies<const D: usize>(
             deck.bodies[points.body[p] as usize].name, points.id[p], points.position[p]
         )
     });
-    match world.first_message(outside) {
-        Some(message) => Err(Error::Input(message)),
-        None => Ok(cells),
-    }
+    world.refuse(Error::Input, outside)?;
+    Ok(cells)
 }
 
 /// What carries each load of the deck. Each point

@@ -3,7 +3,7 @@
 use super::model::Model;
 use crate::contact::start::corners_within;
 use crate::deck::{Presence, When};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::parallel::World;
 use crate::points::Points;
 
@@ -52,5 +52,5 @@ pub fn require_apart<const D: usize>(
         );
         (id, deck.origins.message(&format!("contact.{}.between", pair.index), &why))
     });
-    world.lowest_message(message).map_or(Ok(()), |message| Err(Error::Input(message)))
+    world.refuse_lowest(message)
 }

@@ -167,10 +167,8 @@ impl Conditions {
                 members.push(dof as u32);
             }
         }
-        match world.first_message(problem) {
-            Some(problem) => Err(Error::Input(problem)),
-            None => Ok(conditions),
-        }
+        world.refuse(Error::Input, problem)?;
+        Ok(conditions)
     }
 }
 
@@ -200,10 +198,7 @@ impl Conditions {
             }
             self.fixed[local * N] = true;
         }
-        match world.first_message(problem) {
-            Some(problem) => Err(Error::Input(problem)),
-            None => Ok(()),
-        }
+        world.refuse(Error::Input, problem)
     }
 }
 

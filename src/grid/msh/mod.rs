@@ -71,9 +71,9 @@ pub fn parse(bytes: &[u8]) -> Result<Contents, String> {
                 version2::nodes(&mut scanner, name == "ParametricNodes", &mut contents.nodes)
             }
             ("Elements", Version::V2) => version2::elements(&mut scanner, &mut contents.blocks),
-            ("Entities", _) => version4::entities(&mut scanner, version, &mut groups),
-            ("PartitionedEntities", _) => {
-                version4::partitioned_entities(&mut scanner, version, &mut groups)
+            ("Entities" | "PartitionedEntities", _) => {
+                let partitioned = name == "PartitionedEntities";
+                version4::entities(&mut scanner, version, partitioned, &mut groups)
             }
             ("Nodes", _) => version4::nodes(&mut scanner, version, &mut contents.nodes),
             ("Elements", _) => {

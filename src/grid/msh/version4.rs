@@ -10,67 +10,46 @@ type Groups = FxHashMap<(i64, i64), Vec<i64>>;
 
 /// Points, curves, surfaces and volumes: `number box groups group.. parts part..`. The box of a
 /// point is the point itself since 4.1.
+///
+/// `partitioned`: the parts into which a partition has cut the entities; they keep the groups. Before
+/// the box then stand the parent's dimension and number, and the parts that the piece belongs to.
 pub(super) fn entities(
     scanner: &mut Scanner,
     version: Version,
+    partitioned: bool,
     groups: &mut Groups,
 ) -> Result<(), SyntaxError> {
+    if partitioned {
+        scanner.size()?;
+        let ghosts = scanner.size()?;
+        scanner.skip_ints(2 * ghosts)?;
+    }
     let counts = [scanner.size()?, scanner.size()?, scanner.size()?, scanner.size()?];
     for (dimension, count) in counts.into_iter().enumerate() {
         for _ in 0..count {
             let number = scanner.int()?;
-            entity(scanner, version, dimension as i64, number, groups)?;
+            if partitioned {
+                scanner.skip_ints(2)?;
+                let parts = scanner.size()?;
+                scanner.skip_ints(parts)?;
+            }
+            if dimension == 0 && version == Version::V41 {
+                scanner.reals::<3>()?;
+            } else {
+                scanner.reals::<6>()?;
+            }
+            let mut own = Vec::new();
+            for _ in 0..scanner.size()? {
+                // The sign is the direction of the entity in the group.
+                own.push(scanner.int()?.abs());
+            }
+            if dimension > 0 {
+                let parts = scanner.size()?;
+                scanner.skip_ints(parts)?;
+            }
+            groups.insert((dimension as i64, number), own);
         }
     }
-    Ok(())
-}
-
-/// The parts into which a partition has cut the entities; they keep the groups. Before the
-/// box stand the parent's dimension and number, and the parts that the piece belongs to.
-pub(super) fn partitioned_entities(
-    scanner: &mut Scanner,
-    version: Version,
-    groups: &mut Groups,
-) -> Result<(), SyntaxError> {
-    scanner.size()?;
-    let ghosts = scanner.size()?;
-    scanner.skip_ints(2 * ghosts)?;
-    let counts = [scanner.size()?, scanner.size()?, scanner.size()?, scanner.size()?];
-    for (dimension, count) in counts.into_iter().enumerate() {
-        for _ in 0..count {
-            let number = scanner.int()?;
-            scanner.skip_ints(2)?;
-            let parts = scanner.size()?;
-            scanner.skip_ints(parts)?;
-            entity(scanner, version, dimension as i64, number, groups)?;
-        }
-    }
-    Ok(())
-}
-
-fn entity(
-    scanner: &mut Scanner,
-    version: Version,
-    dimension: i64,
-    number: i64,
-    groups: &mut Groups,
-) -> Result<(), SyntaxError> {
-    if dimension == 0 && version == Version::V41 {
-        scanner.reals::<3>()?;
-    } else {
-        scanner.reals::<6>()?;
-    }
-    let count = scanner.size()?;
-    let mut own = Vec::new();
-    for _ in 0..count {
-        // The sign is the direction of the entity in the group.
-        own.push(scanner.int()?.abs());
-    }
-    if dimension > 0 {
-        let parts = scanner.size()?;
-        scanner.skip_ints(parts)?;
-    }
-    groups.insert((dimension, number), own);
     Ok(())
 }
 

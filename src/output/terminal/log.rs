@@ -16,7 +16,7 @@ const ERASE_LINE: &str = "\r\x1b[2K";
 
 /// Speaks on rank 0 and is silent elsewhere. The directory may come later than the first words:
 /// they are kept and written to `log.txt` once it is known.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Log {
     speaks: bool,
     on_terminal: bool,
@@ -32,29 +32,7 @@ pub struct Log {
 impl Log {
     pub fn new(comm: &SimpleCommunicator) -> Self {
         let speaks = comm.rank() == 0;
-        Self {
-            speaks,
-            on_terminal: speaks && stdout_is_terminal(),
-            quiet: false,
-            transient: false,
-            unwritten: String::new(),
-            file: None,
-            warnings: Warnings::default(),
-        }
-    }
-
-    /// A log that says nothing.
-    #[cfg(test)]
-    pub fn silent() -> Self {
-        Self {
-            speaks: false,
-            on_terminal: false,
-            quiet: false,
-            transient: false,
-            unwritten: String::new(),
-            file: None,
-            warnings: Warnings::default(),
-        }
+        Self { speaks, on_terminal: speaks && stdout_is_terminal(), ..Self::default() }
     }
 
     /// Opens `log.txt`; `resume` continues the one that is there.

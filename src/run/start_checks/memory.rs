@@ -53,10 +53,7 @@ pub fn require<const D: usize>(world: &World, deck: &Deck) -> Result<()> {
             size.points, size.nodes
         )
     });
-    match world.first_message(message) {
-        Some(message) => Err(Error::Input(message)),
-        None => Ok(()),
-    }
+    world.refuse(Error::Input, message)
 }
 
 fn text(amount: f64) -> String {
