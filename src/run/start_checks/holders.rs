@@ -13,32 +13,32 @@ use crate::system::numbering::Numbering;
 use crate::system::supports::Support;
 use crate::system::terms::contact::TOUCH;
 
-use super::rigid_motions::{Extent, Held};
+use super::rigid_motions::{Extent, Restraints};
 
 /// The pieces of the material around the points.
 #[derive(Clone, Copy)]
-pub struct Material<'a, const D: usize> {
+pub struct Pieces<'a, const D: usize> {
     pub model: &'a Model<D>,
     pub points: &'a Points<D>,
     pub numbering: &'a Numbering,
     /// Of each local node.
-    pub pieces: &'a [u64],
+    pub labels: &'a [u64],
     pub extent: &'a Extent<D>,
 }
 
-impl<const D: usize> Material<'_, D> {
+impl<const D: usize> Pieces<'_, D> {
     /// The piece that a point belongs to; `None` if this rank has none of its nodes.
     fn piece_of(&self, p: usize) -> Result<Option<u64>> {
         let (mut cells, mut nodes) = (Vec::new(), Vec::new());
         let (grid, basis) = (&self.model.grid, self.model.deck.method.basis);
         basis::populated_cells(grid, basis, self.points, p, None, &mut cells)?;
         cells.iter().for_each(|&cell| grid.cell_nodes(cell, &mut nodes));
-        Ok(nodes.iter().find_map(|&node| self.numbering.local(node).map(|n| self.pieces[n])))
+        Ok(nodes.iter().find_map(|&node| self.numbering.local(node).map(|n| self.labels[n])))
     }
 
     /// Each direction in which an element of a surface is held, for the piece that its carrier belongs to.
-    pub fn by_supports(&self, stage: usize, held: &mut Held<D>) -> Result<()> {
-        let Material { model, points, .. } = self;
+    pub fn by_supports(&self, stage: usize, held: &mut Restraints<D>) -> Result<()> {
+        let Pieces { model, points, .. } = self;
         for p in carried::carriers(model, points) {
             let Some(piece) = self.piece_of(p)? else { continue };
             let holds = |support: &&Support<D>| {
@@ -61,8 +61,8 @@ impl<const D: usize> Material<'_, D> {
     }
 
     /// Corners that touch a rigid surface are held along its normal or, with friction, along all axes.
-    pub fn by_rigid_bodies(&self, span: StepSpan, held: &mut Held<D>) {
-        let Material { model, points, numbering, pieces, extent } = self;
+    pub fn by_rigid_bodies(&self, span: StepSpan, held: &mut Restraints<D>) {
+        let Pieces { model, points, numbering, labels, extent } = self;
         let (contacts, basis) = (&model.contacts, model.deck.method.basis);
         let (cell, stage) = (model.grid.cell_size(), span.stage);
         // The points are where they are at the start of the run, and so is what they touch from then on.
@@ -81,22 +81,22 @@ impl<const D: usize> Material<'_, D> {
             let Some(node) = node else { continue };
             let along = contacts.pairs[corner.pair].law.symmetric();
             let along = along.then_some(&corner.near.normal);
-            add_contact(extent, held, pieces[node], &corner.place, along);
+            add_contact(extent, held, labels[node], &corner.place, along);
         }
     }
 
     /// Touching bodies hold each other along the normal or, with friction, along all axes.
-    pub fn by_bodies(&self, touches: &[Touch<D>], held: &mut Held<D>) {
+    pub fn by_bodies(&self, touches: &[Touch<D>], held: &mut Restraints<D>) {
         for touch in touches {
             let Some(node) = self.numbering.local(touch.node) else { continue };
             let along = (!touch.rubs).then_some(&touch.normal);
-            add_contact(self.extent, held, self.pieces[node], &touch.place, along);
+            add_contact(self.extent, held, self.labels[node], &touch.place, along);
         }
     }
 
     /// Points that declared terms hold.
-    pub fn by_terms(&self, held: &mut Held<D>) -> Result<()> {
-        let Material { model, points, extent, .. } = self;
+    pub fn by_terms(&self, held: &mut Restraints<D>) -> Result<()> {
+        let Pieces { model, points, extent, .. } = self;
         for term in &model.deck.terms {
             for p in 0..points.len() {
                 let stiffness = term.stiffness(points, p);
@@ -127,7 +127,7 @@ pub struct Touch<const D: usize> {
 /// Holds a place along a direction, or along all axes.
 fn add_contact<const D: usize>(
     extent: &Extent<D>,
-    held: &mut Held<D>,
+    held: &mut Restraints<D>,
     piece: u64,
     place: &[f64; D],
     along: Option<&[f64; D]>,

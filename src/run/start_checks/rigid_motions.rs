@@ -74,12 +74,12 @@ fn count(dimension: usize) -> usize {
 }
 
 /// Σ row row^T of each piece: it maps the motions that all rows annihilate to nothing.
-pub struct Held<const D: usize>(BTreeMap<u64, Vec<f64>>);
+pub struct Restraints<const D: usize>(BTreeMap<u64, Vec<f64>>);
 
-impl<const D: usize> Held<D> {
+impl<const D: usize> Restraints<D> {
     /// Nothing is held.
     pub fn nowhere() -> Self {
-        Held(BTreeMap::new())
+        Restraints(BTreeMap::new())
     }
 
     /// A piece of which nothing may be held.

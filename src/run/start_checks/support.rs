@@ -20,9 +20,9 @@ use crate::system::step_system;
 use crate::system::terms::contact::TOUCH;
 use crate::system::unknowns::Unknowns;
 
-use super::holders::{Material, Touch};
+use super::holders::{Pieces, Touch};
 use super::pieces;
-use super::rigid_motions::{Extent, Held};
+use super::rigid_motions::{Extent, Restraints};
 
 /// An error where a rigid motion solves the first step's equations. Collective.
 pub fn require<const D: usize>(
@@ -209,23 +209,23 @@ fn loose<const D: usize>(
     let springs: [bool; D] = std::array::from_fn(|axis| {
         (hoops && axis == 0) || deck.loads.iter().any(|load| load.may_hold(axis))
     });
-    let pieces = pieces::labels(world, grid, populated, &faces, numbering)?;
+    let labels = pieces::labels(world, grid, populated, &faces, numbering)?;
     let extent = Extent::of(world, points);
-    let mut held = Held::nowhere();
-    for (local, &piece) in pieces.iter().enumerate().take(numbering.owned) {
+    let mut held = Restraints::nowhere();
+    for (local, &piece) in labels.iter().enumerate().take(numbering.owned) {
         held.enter(piece);
         let x = grid.node_position(numbering.nodes[local]);
         for axis in (0..D).filter(|&axis| conditions.fixed[local * D + axis] || springs[axis]) {
             held.add(piece, &extent.component(&x, axis));
         }
     }
-    let material = Material { model, points, numbering, pieces: &pieces, extent: &extent };
-    material.by_supports(first.stage, &mut held)?;
-    material.by_terms(&mut held)?;
-    material.by_rigid_bodies(first, &mut held);
-    material.by_bodies(touches, &mut held);
+    let pieces = Pieces { model, points, numbering, labels: &labels, extent: &extent };
+    pieces.by_supports(first.stage, &mut held)?;
+    pieces.by_terms(&mut held)?;
+    pieces.by_rigid_bodies(first, &mut held);
+    pieces.by_bodies(touches, &mut held);
     let Some((piece, motion)) = held.free(world, model, pulled)? else { return Ok(None) };
-    let what = name_piece(world, model, points, numbering, &pieces, piece)?;
+    let what = name_piece(world, model, points, numbering, &labels, piece)?;
     Ok(Some((what, motion)))
 }
 
