@@ -113,31 +113,9 @@ fn ranks_agree_on_a_free_body_and_a_restart_repeats_it() {
     }
 }
 
-/// It rolls down at 2/3 g sin t (formulations.md C.5; t = 20 degrees), once it has settled.
-#[test]
-fn a_free_disc_rolls_in_implicit_steps() {
-    let text = DROPPED
-        .replace("velocity = [0.3, -1.0]\n", "")
-        .replace("centre = [0.1, 0.51], radius = 0.5", "centre = [-0.4, 0.5], radius = 0.5")
-        .replace("friction = 0.3", "friction = 0.6")
-        .replace("duration = 0.25\nsteps = 100", "duration = 0.8\nsteps = 80\non_failure = \"cut\"")
-        .replace("young = 1e6", "young = 4e6");
-    let text =
-        format!("{text}\n[[load]]\ngravity = [\"if(t>0.4, 3.3552, 0)\", \"-9.2184*min(1,3*t)\"]\n");
-    let results = Run::text(&text).results();
-    let gained = gained(&results, "disc", 0.4);
-    assert!((gained / (2.2368 * 0.4) - 1.0).abs() < 0.03, "{gained}");
-    // Without slip: the spin is the speed over the radius.
-    let (speed, spin) =
-        (last(&results, "rigid.disc.velocity_x"), last(&results, "rigid.disc.spin_z"));
-    assert!((-0.5 * spin / speed - 1.0).abs() < 0.03, "{speed} {spin}");
-}
-
-/// In space a ball rolls down at 5/7 g sin t.
-#[test]
-#[ignore = "60 implicit steps in space, several solves each"]
-fn a_free_ball_rolls_in_implicit_steps() {
-    let text = r#"
+/// A stiff layer, bonded to what is below it, whose corners lie closer together than a body that rolls on it is wide where it
+/// touches. Weight and drive come so slowly that little swings.
+const LAYER: &str = r#"
 [analysis]
 type = "implicit-dynamic"
 duration = 0.6
@@ -149,37 +127,65 @@ basis = "gimp"
 domain_update = "stretch"
 [grid]
 type = "lattice"
-origin = [-0.75, -0.5, -0.25]
-size = [1.5, 1.0, 0.5]
-h = 0.125
+origin = [-0.5, -0.0625]
+size = [0.5, 0.125]
+h = 0.0625
 [material.rubber]
 model = "hencky"
-young = 4e6
-poisson = 0.3
+young = 1e7
+poisson = 0.0
 [[body]]
 name = "ground"
 material = "rubber"
 density = 1000.0
-shape = { box = { min = [-0.75, -0.5, -0.25], max = [0.75, 0.5, 0.0] } }
+points_per_cell = 4
+shape = { box = { min = [-0.5, -0.0625], max = [0.0, 0.0] } }
 [[boundary]]
 name = "base"
-where = { side = "back" }
-fix = ["x", "y", "z"]
+where = { side = "bottom" }
+fix = ["x", "y"]
 [[rigid]]
-name = "ball"
-shape = { ball = { centre = [-0.3, 0.0, 0.5], radius = 0.5 } }
+name = "roller"
+shape = { disc = { centre = [-0.35, 0.5], radius = 0.5 } }
 density = 1000.0
 [[contact]]
-between = ["ball", "ground"]
+between = ["roller", "ground"]
 friction = 0.6
 [[load]]
-gravity = ["if(t>0.3, 3.3552, 0)", 0.0, "-9.2184*min(1,4*t)"]
+gravity = ["1.6776*(1-cos(pi*min(1,max(0,(t-0.15)/0.15))))", "-4.6092*(1-cos(pi*min(1,t/0.15)))"]
 [output]
 every = 60
 "#;
-    let results = Run::text(text).results();
-    let gained = gained(&results, "ball", 0.3);
-    assert!((gained / (5.0 / 7.0 * 3.3552 * 0.3) - 1.0).abs() < 0.03, "{gained}");
+
+/// It rolls down at 2/3 g sin t (formulations.md C.5; t = 20 degrees) on ground that hardly gives way.
+#[test]
+fn a_free_disc_rolls_in_implicit_steps() {
+    let results = Run::text(LAYER).results();
+    let gained = gained(&results, "roller", 0.3);
+    assert!((gained / (2.2368 * 0.3) - 1.0).abs() < 0.01, "{gained}");
+    // Without slip: the spin is the speed over the radius.
+    let (speed, spin) =
+        (last(&results, "rigid.roller.velocity_x"), last(&results, "rigid.roller.spin_z"));
+    assert!((-0.5 * spin / speed - 1.0).abs() < 0.01, "{speed} {spin}");
+}
+
+/// In space a ball rolls down at 5/7 g sin t.
+#[test]
+#[ignore = "60 implicit steps in space, several solves each"]
+fn a_free_ball_rolls_in_implicit_steps() {
+    let text = LAYER
+        .replace("[-0.5, -0.0625]", "[-0.5, -0.125, -0.0625]")
+        .replace("size = [0.5, 0.125]", "size = [0.5, 0.25, 0.125]")
+        .replace("max = [0.0, 0.0]", "max = [0.0, 0.125, 0.0]")
+        .replace(
+            "side = \"bottom\" }\nfix = [\"x\", \"y\"]",
+            "side = \"back\" }\nfix = [\"x\", \"y\", \"z\"]",
+        )
+        .replace("disc = { centre = [-0.35, 0.5]", "ball = { centre = [-0.35, 0.0, 0.5]")
+        .replace("0.15)))\", \"-4.6", "0.15)))\", 0.0, \"-4.6");
+    let results = Run::text(&text).results();
+    let gained = gained(&results, "roller", 0.3);
+    assert!((gained / (5.0 / 7.0 * 3.3552 * 0.3) - 1.0).abs() < 0.01, "{gained}");
 }
 
 /// A disc of rubber bounces off a held floor: its momentum changes by the impulse to round-off, and the

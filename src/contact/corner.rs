@@ -102,3 +102,10 @@ fn tilted<const D: usize>(points: &Points<D>, p: usize) -> [[f64; D]; 8] {
     }
     corners
 }
+
+/// No corner of a domain of `gimp` is further from its point, m.
+pub fn farthest<const D: usize>(points: &Points<D>, p: usize) -> f64 {
+    let (gradient, first) = (&points.deformation_gradient[p], &points.half_length_initial[p]);
+    let along = |i: usize| (0..D).map(|j| gradient[(i, j)].abs() * first[j]).sum::<f64>();
+    (0..D).map(|i| along(i) * along(i)).sum::<f64>().sqrt()
+}

@@ -108,15 +108,7 @@ impl<const D: usize> Grid<D> {
     ) -> Option<ShapeFunctions> {
         match self {
             Grid::Lattice(lattice) => {
-                let mut low = lattice_cell(lattice, x, allowance)?;
-                for a in 0..D {
-                    let t = lattice.scaled(a, x[a]);
-                    let line = t.round();
-                    if (t - line).abs() <= LINE_TOLERANCE {
-                        let below = line > 0.0 && lattice.scaled(a, centre[a]) < line;
-                        low[a] = (line as usize - usize::from(below)).min(lattice.cells[a] - 1);
-                    }
-                }
+                let low = cell_towards(lattice, x, centre, allowance)?;
                 Some(values_on_lattice(lattice, low, &on_lines(within(lattice, low, x))))
             }
             Grid::Mesh(mesh) => {
@@ -136,6 +128,46 @@ impl<const D: usize> Grid<D> {
             }
         }
     }
+
+    /// The values at `x`, which may lie beyond its cell, by the functions of the cell that
+    /// [`Self::values_towards`] takes for a place `near` it.
+    pub fn values_continued(
+        &self,
+        x: &[f64; D],
+        near: &[f64; D],
+        centre: &[f64; D],
+        allowance: f64,
+    ) -> Option<ShapeFunctions> {
+        match self {
+            Grid::Lattice(lattice) => {
+                let low = cell_towards(lattice, near, centre, allowance)?;
+                Some(values_on_lattice(lattice, low, &on_lines(within(lattice, low, x))))
+            }
+            Grid::Mesh(_) => {
+                let values = self.values_towards(near, centre, allowance, None)?;
+                self.interpolate_in(values.cell, x).map(|at| at.values)
+            }
+        }
+    }
+}
+
+/// [`lattice_cell`], where `x` lies on a line the cell on the side of `centre`.
+fn cell_towards<const D: usize>(
+    lattice: &Lattice<D>,
+    x: &[f64; D],
+    centre: &[f64; D],
+    allowance: f64,
+) -> Option<[usize; D]> {
+    let mut low = lattice_cell(lattice, x, allowance)?;
+    for a in 0..D {
+        let t = lattice.scaled(a, x[a]);
+        let line = t.round();
+        if (t - line).abs() <= LINE_TOLERANCE {
+            let below = line > 0.0 && lattice.scaled(a, centre[a]) < line;
+            low[a] = (line as usize - usize::from(below)).min(lattice.cells[a] - 1);
+        }
+    }
+    Some(low)
 }
 
 /// Coordinates within a cell of a lattice, those next to a face put onto it.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::basis::Domain;
 use crate::contact::Pair;
-use crate::contact::corner::DomainCorners;
+use crate::contact::corner::{self, DomainCorners};
 use crate::contact::free::FreeBody;
 use crate::contact::law::Reached;
 use crate::contact::pose::Pose;
@@ -17,7 +17,7 @@ use crate::system::conditions::StepSpan;
 use crate::system::model::Model;
 use crate::system::step_system::Discretisation;
 
-use super::node_gaps::NodeGaps;
+use super::far::Far;
 use super::{Candidate, ContactTerm};
 
 /// Cells within which a corner may come to a surface in an implicit step.
@@ -25,6 +25,8 @@ const MARGIN: f64 = 2.0;
 /// Cells within which a corner may come to a surface in an explicit step: waves pass at most one cell in it, points
 /// far less.
 const MARGIN_EXPLICIT: f64 = 0.25;
+/// Of a length.
+const ROUND_OFF: f64 = 1.0 + 1e-12;
 
 impl<const D: usize> ContactTerm<D> {
     /// `None` where the deck has no contact. `free`: the rigid bodies that move freely, at the step's
@@ -72,13 +74,15 @@ impl<const D: usize> ContactTerm<D> {
             if !of.presence.is_in(span.stage) {
                 continue;
             }
-            let nodes = term.node_gaps(model, mesh, of);
-            let step = mesh.step_points(points, &model.materials);
+            let surface = &*contacts.rigids[of.rigid].surface;
+            let mut far = Far::new(surface, term.looked_at(of.rigid).collect(), term.cell);
             for p in (0..points.len()).filter(|&p| points.body[p] as usize == of.body) {
-                let (x, reach) = (&points.position[p], term.reach(&points.half_length[p]));
-                let node = step.nodes_of(p).first();
-                let far = node.is_some_and(|&node| nodes.beyond(node, x, reach));
-                if !far && term.may_touch(of, x, reach) {
+                let x = &points.position[p];
+                if far.beyond(x, term.reach(&points.half_length[p])) {
+                    continue;
+                }
+                let basis = model.deck.method.basis;
+                if term.may_touch(of, x, term.narrow_reach(basis, points, p)) {
                     term.add_corners(model, mesh, points, (pair, of), p);
                 }
             }
@@ -101,15 +105,18 @@ impl<const D: usize> ContactTerm<D> {
         2.0 * half.iter().sum::<f64>() + self.margin
     }
 
+    /// [`Self::reach`], and less where it is known how far the corners of the domain are.
+    fn narrow_reach(&self, basis: Basis, points: &Points<D>, p: usize) -> f64 {
+        match (self.explicit, basis.domain()) {
+            (true, Domain::Box) => ROUND_OFF * corner::farthest(points, p) + self.margin,
+            _ => self.reach(&points.half_length[p]),
+        }
+    }
+
     /// Of a rigid body at the moments that count for where corners are looked for.
     fn looked_at(&self, rigid: usize) -> impl Iterator<Item = Pose<D>> + Clone {
         let moments = if self.explicit { 1 } else { 2 };
         self.poses.iter().take(moments).map(move |poses| poses[rigid])
-    }
-
-    fn node_gaps(&self, model: &Model<D>, mesh: &Discretisation<D>, pair: &Pair) -> NodeGaps<D> {
-        let surface = &*self.contacts.rigids[pair.rigid].surface;
-        NodeGaps::new(&model.grid, &mesh.numbering, surface, self.looked_at(pair.rigid))
     }
 
     /// Whether the domain of a point may come to the surface in the step.
@@ -190,8 +197,7 @@ impl<const D: usize> ContactTerm<D> {
                 let half = &points.half_length[p];
                 let held: [f64; D] =
                     std::array::from_fn(|a| place[a].clamp(x[a] - half[a], x[a] + half[a]));
-                let cell = grid.values_towards(&held, x, REACH, None).map(|values| values.cell);
-                cell.and_then(|cell| grid.interpolate_in(cell, place)).map(|at| at.values)
+                grid.values_continued(place, &held, x, REACH)
             }
             _ => grid.values_towards(place, x, REACH, None),
         };

@@ -10,11 +10,11 @@
 //! |---|---|
 //! | `mod.rs` | forces and tangent at an iterate |
 //! | `corners.rs` | which corners may touch in a step, and what moves them |
-//! | `node_gaps.rs` | which points are far from a surface |
+//! | `far.rs` | which points are far from a surface |
 //! | `records.rs` | what a step leaves |
 
 mod corners;
-mod node_gaps;
+mod far;
 mod records;
 
 use std::ops::Range;

@@ -14,10 +14,9 @@ impl<const D: usize> ContactTerm<D> {
         let mut found = (self.cell, None);
         for of in &self.candidates {
             let x = self.position(of, displacement);
-            if let Some((gap, _)) = self.respond(of, &x)
-                && -gap > found.0
-            {
-                found = (-gap, Some((of, x)));
+            let depth = -self.near_at_end(of, &x).gap;
+            if depth > found.0 {
+                found = (depth, Some((of, x)));
             }
         }
         let (depth, at) = found;
@@ -57,13 +56,19 @@ impl<const D: usize> ContactTerm<D> {
                 state.as_ref().map_or([0.0; D], |(_, response)| response.traction)
             };
             let ends = [of_state(&of.first), of_state(&last)];
-            let mean = |shares: [f64; 2]| {
-                std::array::from_fn(|i| of.area * (shares[0] * ends[0][i] + shares[1] * ends[1][i]))
-            };
+            let mean: [f64; D] =
+                std::array::from_fn(|i| of.area * (0.5 * ends[0][i] + 0.5 * ends[1][i]));
             let rigid = self.contacts.pairs[of.pair].rigid;
-            done.work += dot(&mean([0.5; 2]), &self.carried(of, &x));
-            let centre = self.contacts.rigids[rigid].torque_centre(&self.poses[1][rigid]);
-            done.rigids[rigid].add(&mean(shares), &x, &centre);
+            done.work += dot(&mean, &self.carried(of, &x));
+            // Each force about where the centre is when it acts: with one centre for both the normal
+            // forces of a ball that rolls act half a step's way behind it, and speed it up.
+            for (end, (place, share)) in [of.place, x].iter().zip(shares).enumerate() {
+                let centre = self.contacts.rigids[rigid].torque_centre(&self.poses[end][rigid]);
+                let force = ends[end].map(|t| of.area * (share * t));
+                if share != 0.0 {
+                    done.rigids[rigid].add(&force, place, &centre);
+                }
+            }
             let mut slip = [0.0; D];
             if let Some((gap, response)) = &last {
                 let share = self.shares[of.pair][1];
