@@ -228,6 +228,25 @@ fn last_passes_over_whatever_it_cannot_take() {
     }
 }
 
+/// A checkpoint that 1571419 wrote in format 1, with b_e in place of b_e - 1, goes on as the run that it is part of.
+#[test]
+fn a_checkpoint_of_format_1_is_continued() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let (deck, old) = (data.join("format-1.toml"), data.join("format-1.h5"));
+    let folder = tempfile::tempdir().unwrap();
+    let (whole, part) = (folder.path().join("whole"), folder.path().join("part"));
+    run_well(1, &deck, &whole, &[]);
+    run_well(2, &deck, &part, &["--restart", &old.display().to_string()]);
+    // That program numbered its points in another order, so sums are compared.
+    for name in ["energy_strain", "energy_plastic", "work_external", "reaction.left.x"] {
+        let [whole, part] = [&whole, &part].map(|out| *column(out, name).last().unwrap());
+        assert!((part / whole - 1.0).abs() < 1e-9, "{name}: {part}, in one run {whole}");
+    }
+    // The last row of that program's own history.
+    let strain = *column(&part, "energy_strain").last().unwrap();
+    assert!((strain / 668.467701355831 - 1.0).abs() < 1e-9, "{strain}");
+}
+
 /// Content with a seal of this format that belongs to it.
 fn resealed(content: Vec<u8>, format: u64) -> Vec<u8> {
     let blocks = content.chunks(1 << 20).enumerate().map(|(block, bytes)| {
