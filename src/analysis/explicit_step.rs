@@ -138,6 +138,9 @@ pub(crate) fn advance<const D: usize>(
     for (v, a) in velocity.iter_mut().zip(&acceleration) {
         *v += dt * a;
     }
+    // The work of what resists a motion along the way is that over the mean velocity of the step: over the velocity of
+    // its end alone an oscillator would lose energy in every period.
+    let lag: f64 = exerted.iter().zip(&acceleration).map(|(f, a)| 0.5 * dt * dt * f * a).sum();
     let mut damped = 0.0;
     if !slowed.is_empty() {
         // By the mean velocity of the step.
@@ -169,16 +172,6 @@ pub(crate) fn advance<const D: usize>(
         *r += taken / dt;
     }
     let pressure_work: f64 = pressed.iter().zip(&moved).map(|(f, u)| f * u).sum();
-    let stiffening = if exerted.is_empty() {
-        0.0
-    } else {
-        // What resists a motion along the way has done the work of its mean force: by the force of the start alone
-        // an oscillator would lose energy in every period.
-        let of = Context::new(world, model, (&mesh, points), span);
-        let ended = declaration::exerted(of, Some(&moved))?;
-        let gains = ended.iter().zip(&exerted).zip(&moved);
-        gains.map(|((end, start), u)| 0.5 * (end - start) * u).sum()
-    };
     // The force of a ring acts where its mass is, its place is the middle of its section.
     let weighed;
     let carried = if mesh.influences.hoop.is_empty() {
@@ -187,9 +180,7 @@ pub(crate) fn advance<const D: usize>(
         weighed = mapping::at_points(step, &moved);
         &weighed
     };
-    let work = point_work(&external, carried)
-        + pressure_work
-        + stiffening
+    let work = point_work(&external, carried) + pressure_work - lag
         + touching.as_ref().map_or(0.0, |touching| touching.work)
         + boundary_work(&conditions, &residual, &displacement);
     let ghost = mass.ghost_energy(&mesh, &velocity);
