@@ -142,6 +142,51 @@ fn the_way_of_a_velocity_begins_with_its_stage() {
     }
 }
 
+const DROPPED: &str = r#"
+[[stage]]
+name = "drop"
+duration = 0.1
+[[body]]
+name = "drop"
+from = "drop"
+material = "rubber"
+density = 1000.0
+shape = { box = { min = [1.5, 0.0], max = [2.0, 0.5] } }
+velocity = [0.0, -1.0]
+[[contact]]
+between = ["drop", "floor"]
+[[foundation]]
+body = "drop"
+axis = "x"
+stiffness = 1e3
+"#;
+
+/// A body that comes with a stage touches what it has a contact with: a gap of 0.02 m is closed 0.02 s after the stage's
+/// start. The run goes on from before that bit by bit.
+#[test]
+fn a_body_that_comes_brings_its_contacts() {
+    let (before, _) = FALLING.split_once("[[rigid]]").expect("a rigid body");
+    let text = before.replace("[[stage]]\nname = \"push\"\nduration = 0.1\n", "")
+        + "[[rigid]]\nname = \"floor\"\n\
+           shape = { half_space = { point = [0, -0.02], normal = [0, 1] } }\n";
+    let output = "[output]\ncheckpoint = { every = 5, keep = 100 }\n";
+    let folder = tempfile::tempdir().expect("a scratch folder");
+    let deck = folder.path().join("deck.toml");
+    std::fs::write(&deck, format!("{text}{DROPPED}{output}")).unwrap();
+    for ranks in [1, 2] {
+        let at = |name: &str| folder.path().join(format!("{name}-{ranks}"));
+        program::run_well(ranks, &deck, &at("whole"), &[]);
+        let middle = at("whole").join("checkpoint-000005.h5").display().to_string();
+        program::run_well(ranks, &deck, &at("rest"), &["--restart", &middle]);
+        assert_eq!(program::history(&at("rest"))[..], program::history(&at("whole"))[5..]);
+        let [time, force] =
+            ["time", "reaction.floor.y"].map(|name| program::column(&at("whole"), name));
+        let first = force.iter().position(|force| *force > 0.0).expect("a contact");
+        let step = time[first] - time[first - 1];
+        assert!((time[first] - 0.07).abs() < 2.5 * step, "{} {step}", time[first]);
+    }
+}
+
 /// Two bodies that touch in the first stage alone slip in that one.
 #[test]
 fn bodies_slip_while_their_contact_is_there() {

@@ -8,7 +8,8 @@
 
 use super::expression::{Expression, Variable};
 use super::model::{
-    AnalysisType, BodySource, Deck, Every, Grid, MeshSource, OnFailure, Output, RigidShape,
+    AnalysisType, BodySource, Contact, Deck, Every, Grid, MeshSource, OnFailure, Output, Partner,
+    RigidShape,
 };
 use super::resolved::resolved;
 use super::stage::Presence;
@@ -49,7 +50,7 @@ impl Physics {
 }
 
 /// The deck without the stages from `count` on, and without what comes with those. Bodies stay where
-/// others follow that do not go: points know bodies by their index.
+/// others follow that do not go: points know bodies by their index. With a body go the terms that act on it.
 fn first_stages(deck: &Deck, count: usize) -> Deck {
     let mut deck = deck.clone();
     if count >= deck.stages.len() {
@@ -59,9 +60,20 @@ fn first_stages(deck: &Deck, count: usize) -> Deck {
     deck.stages.truncate(count);
     deck.analysis.steps = deck.stages.iter().map(|stage| stage.steps).sum();
     deck.analysis.duration = deck.stages.iter().map(|stage| stage.duration).sum();
-    while deck.bodies.last().is_some_and(|body| later(&body.presence)) {
+    // A checkpoint knows the state of all contacts there are: one more makes another problem.
+    let touches = |deck: &Deck, body: usize| {
+        let names =
+            |contact: &Contact| contact.body == body || contact.partner == Partner::Body(body);
+        deck.contacts.iter().any(names)
+    };
+    while let Some(last) = deck.bodies.len().checked_sub(1)
+        && later(&deck.bodies[last].presence)
+        && !touches(&deck, last)
+    {
         deck.bodies.pop();
     }
+    let known = 0..deck.bodies.len();
+    deck.terms.retain(|term| term.of_body().is_none_or(|body| known.contains(&body)));
     deck.boundaries.retain(|boundary| !later(&boundary.presence));
     let loads = std::mem::take(&mut deck.loads).into_iter().zip(deck.load_presence);
     (deck.loads, deck.load_presence) = loads.filter(|(_, presence)| !later(presence)).unzip();
@@ -306,6 +318,29 @@ mod tests {
         let other = staged(&format!("{more}[[load]]\nbody_force = [2, 0]\n"), "");
         assert!(difference(short.whole(), other.beside(short.whole())).is_some());
         assert!(difference(long.whole(), short.beside(long.whole())).is_some());
+    }
+
+    #[test]
+    fn a_stage_may_bring_a_body_with_springs_but_no_contact() {
+        let staged = |more: &str| {
+            let text = reference::EXAMPLE.replacen("steps = 50\n", "", 1);
+            let text = text.replacen("nearest = ", "body = \"beam\", nearest = ", 1);
+            let rigid =
+                "[[rigid]]\nname = \"r\"\nshape = { box = { min = [0, 0], max = [1, 1] } }\n";
+            let text = format!("{text}\n{rigid}[[stage]]\nname = \"a\"\nsteps = 3\n{more}");
+            Physics::of(&read(Path::new("deck.toml"), &text, &[]).unwrap())
+        };
+        let body = "[[stage]]\nname = \"b\"\nsteps = 2\n[[body]]\nname = \"top\"\nfrom = \"b\"\n\
+                    material = \"rubber\"\nshape = { box = { min = [8, 2], max = [9, 3] } }\n";
+        let contact = |with: &str| format!("[[contact]]\nbetween = [\"top\", \"{with}\"]\n");
+        let springs = "[[foundation]]\nbody = \"top\"\naxis = \"x\"\nstiffness = 1.0\n";
+        let short = staged("");
+        let long = staged(&format!("{body}{springs}"));
+        assert_eq!(difference(short.whole(), long.beside(short.whole())), None);
+        for with in ["r", "beam"] {
+            let touching = staged(&format!("{body}{}", contact(with)));
+            assert!(difference(short.whole(), touching.beside(short.whole())).is_some());
+        }
     }
 
     #[test]

@@ -60,6 +60,9 @@ pub trait Declaration: Sized {
     /// Keys and values as TOML, with every default; they read back to the same term.
     fn written(&self, bodies: &[Body]) -> Vec<(&'static str, String)>;
 
+    /// The body that it acts on, if it is one alone.
+    fn of_body(&self) -> Option<usize>;
+
     /// Whether it may resist a motion along an axis.
     fn may_hold(&self, axis: usize) -> bool;
 
@@ -67,8 +70,8 @@ pub trait Declaration: Sized {
     /// that does not. It limits time steps of explicit analyses, and tells which pieces of the material are held.
     fn stiffness<const D: usize>(&self, points: &Points<D>, p: usize) -> [f64; D];
 
-    /// The term of a step. In explicit analyses its force at the step's start acts, and the mean of this force and of
-    /// the one at its end does the work: there it meets no rows, and the sparsity has fewer columns. Collective.
+    /// The term of a step. In explicit analyses its force at the step's start acts: there it meets no rows, and
+    /// the sparsity has fewer columns. Collective.
     fn make<'a, const D: usize>(&'a self, of: Context<'a, D>) -> Result<Box<dyn Term<D> + 'a>>;
 }
 
@@ -153,6 +156,11 @@ macro_rules! terms {
             /// See [`Declaration::written`].
             pub(crate) fn written(&self, bodies: &[Body]) -> Vec<(&'static str, String)> {
                 match self { $( $(#[$when])? Declared::$term(term) => term.written(bodies), )* }
+            }
+
+            /// See [`Declaration::of_body`].
+            pub(crate) fn of_body(&self) -> Option<usize> {
+                match self { $( $(#[$when])? Declared::$term(term) => term.of_body(), )* }
             }
 
             /// See [`Declaration::may_hold`].

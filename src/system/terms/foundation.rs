@@ -61,6 +61,10 @@ impl Declaration for Foundation {
         ]
     }
 
+    fn of_body(&self) -> Option<usize> {
+        Some(self.body)
+    }
+
     fn may_hold(&self, axis: usize) -> bool {
         axis == self.axis
     }
