@@ -85,7 +85,18 @@ struct Coarsening {
 const FINEST: Coarsening = Coarsening { distance: 2, most_left: 1.0 };
 const COARSER: Coarsening = Coarsening { distance: 1, most_left: 0.8 };
 
-/// The hierarchy under an assembled system, which may be `symmetric` or not; `ties`: what penalties do to it. Fields
+/// What is known of a matrix before it is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum MatrixKind {
+    /// It equals its transposed.
+    Symmetric,
+    /// It does not: friction, flow, or the deck's wish.
+    Unsymmetric,
+    /// It does not, and plastic flow that is not associated is among the reasons.
+    Flowing,
+}
+
+/// The hierarchy under an assembled system; `ties`: what penalties do to it. Fields
 /// that are no displacements are smooth where each is constant. `None` for one of these, of which there are no
 /// products by blocks, and for more than four ([`serves`]). Collective.
 pub fn of_system<const D: usize, const N: usize>(
@@ -94,7 +105,7 @@ pub fn of_system<const D: usize, const N: usize>(
     numbering: &Numbering,
     rows: &Assembled,
     ties: &Ties<N>,
-    (unknowns, symmetric): (Unknowns<N>, bool),
+    (unknowns, kind): (Unknowns<N>, MatrixKind),
 ) -> Result<Option<Hierarchy>> {
     let modes = if unknowns.displacements { Modes::RigidMotions } else { Modes::Constants };
     let nodes = Nodes {
@@ -103,19 +114,22 @@ pub fn of_system<const D: usize, const N: usize>(
         modes,
         ..nodes_of(numbering)
     };
-    match (modes, N, symmetric) {
+    let flows = kind == MatrixKind::Flowing;
+    match (modes, N, kind == MatrixKind::Symmetric) {
         (Modes::RigidMotions, 2, true) | (Modes::Constants, 3, true) => {
             build::<N, 3>(world, &nodes, rows, ties)
         }
         (Modes::RigidMotions, 2, false) | (Modes::Constants, 3, false) => {
-            build_unsymmetric::<N, 3>(world, &nodes, rows, ties)
+            build_unsymmetric::<N, 3>(world, &nodes, rows, ties, flows)
         }
         (Modes::RigidMotions, _, true) => build::<N, 6>(world, &nodes, rows, ties),
-        (Modes::RigidMotions, _, false) => build_unsymmetric::<N, 6>(world, &nodes, rows, ties),
+        (Modes::RigidMotions, _, false) => {
+            build_unsymmetric::<N, 6>(world, &nodes, rows, ties, flows)
+        }
         (Modes::Constants, 2, true) => build::<N, 2>(world, &nodes, rows, ties),
-        (Modes::Constants, 2, false) => build_unsymmetric::<N, 2>(world, &nodes, rows, ties),
+        (Modes::Constants, 2, false) => build_unsymmetric::<N, 2>(world, &nodes, rows, ties, flows),
         (Modes::Constants, 4, true) => build::<N, 4>(world, &nodes, rows, ties),
-        (Modes::Constants, 4, false) => build_unsymmetric::<N, 4>(world, &nodes, rows, ties),
+        (Modes::Constants, 4, false) => build_unsymmetric::<N, 4>(world, &nodes, rows, ties, flows),
         (Modes::Constants, ..) => Ok(None),
     }
 }
@@ -184,12 +198,14 @@ pub fn build<const K: usize, const C: usize>(
     levels::<K, C>(world, (nodes, rows, &ties.nodes), exact, rounded)
 }
 
-/// As [`build`], under a matrix that need not be symmetric but has a symmetric pattern. Collective.
+/// As [`build`], under a matrix that need not be symmetric but has a symmetric pattern; where it `flows`, few nodes that
+/// do are solved together ([`flow`]). Collective.
 pub fn build_unsymmetric<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,
     rows: &impl Rows<K>,
     ties: &Ties<K>,
+    flows: bool,
 ) -> Result<Option<Hierarchy>> {
     let (ghosts, count) = (nodes.global[nodes.owned..].to_vec(), count(nodes, rows));
     let mut exact = BlockProduct::unsymmetric::<K>(nodes.owned, ghosts.clone(), count);
@@ -204,6 +220,9 @@ pub fn build_unsymmetric<const K: usize, const C: usize>(
     fill(rows, &mut rounded);
     let made = levels::<K, C>(world, (nodes, &symmetric, &[]), exact, rounded)?;
     let Some(mut made) = made else { return Ok(None) };
+    if !flows {
+        return Ok(Some(made));
+    }
     let flow = Flow::of(world, nodes, rows, &symmetric);
     // Its block leaves the largest eigenvalue where it is: of the block alone it is 1.
     made.levels[0].smoother = Some(flow.smoother(world, nodes, rows)?);

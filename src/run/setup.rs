@@ -173,7 +173,8 @@ fn model_of<const D: usize>(
     found: Vec<Found<D>>,
     points: &Points<D>,
 ) -> Result<Model<D>> {
-    let Overview { stiffness, symmetric } = Overview::of(world, &deck, &materials, points);
+    let Overview { stiffness, symmetric: associated } =
+        Overview::of(world, &deck, &materials, points);
     let penalties = deck
         .bodies
         .iter()
@@ -199,7 +200,7 @@ fn model_of<const D: usize>(
     let contacts =
         Arc::new(Contacts::of_deck(&deck, &stiffness, (grid.cell_size(), grid.node_count()))?);
     let facing = surfaces::facing(world, &deck, points, &contacts)?;
-    let symmetric = symmetric
+    let symmetric = associated
         && contacts.symmetric()
         && loads.iter().all(|load| load.symmetric())
         && !supports.iter().any(|support| support.nitsche);
@@ -212,6 +213,7 @@ fn model_of<const D: usize>(
         penalties,
         stiffness,
         symmetric,
+        associated,
         loads,
         supports,
         facing,

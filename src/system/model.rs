@@ -35,6 +35,8 @@ pub struct Model<const D: usize> {
     pub stiffness: Vec<f64>,
     /// Whether the tangents of all materials, loads and contacts are symmetric in every state.
     pub symmetric: bool,
+    /// Whether the tangents of all materials alone are.
+    pub associated: bool,
     /// In the order of the deck.
     pub loads: Vec<Box<dyn Load<D>>>,
     /// Surfaces that are held off the grid's nodes.

@@ -163,9 +163,13 @@ impl<const D: usize> Levelled for Hardening<'_, D> {
         let (world, nodes) = (self.world, &self.share.nodes);
         match (D, self.symmetric) {
             (2, true) => amg::build::<D, 3>(world, nodes, &rows, &Ties::default()),
-            (2, false) => amg::build_unsymmetric::<D, 3>(world, nodes, &rows, &Ties::default()),
+            (2, false) => {
+                amg::build_unsymmetric::<D, 3>(world, nodes, &rows, &Ties::default(), true)
+            }
             (_, true) => amg::build::<D, 6>(world, nodes, &rows, &Ties::default()),
-            (_, false) => amg::build_unsymmetric::<D, 6>(world, nodes, &rows, &Ties::default()),
+            (_, false) => {
+                amg::build_unsymmetric::<D, 6>(world, nodes, &rows, &Ties::default(), true)
+            }
         }
     }
 

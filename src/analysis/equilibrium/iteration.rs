@@ -2,7 +2,7 @@
 
 use crate::amg::flow::Flow;
 use crate::amg::level::Assembled;
-use crate::amg::{self, BlockSmoother, Hierarchy, Levelled, Levels};
+use crate::amg::{self, BlockSmoother, Hierarchy, Levelled, Levels, MatrixKind};
 use crate::analysis::convergence::{converges_next, hardly_falls, stalls};
 use crate::blocks::BlockProduct;
 use crate::error::Result;
@@ -114,14 +114,13 @@ impl<const D: usize, const N: usize> Levelled for Equilibrium<'_, D, N> {
 
     fn hierarchy(&mut self, matrix: &mut Matrix) -> Result<Option<Hierarchy>> {
         self.with_rows(matrix, |rows| {
-            let (ties, symmetric) = (self.ties(rows)?, self.symmetric());
-            let (of, kinds) = (self.numbering, (self.unknowns, symmetric));
-            amg::of_system(self.world, self.grid, of, rows, &ties, kinds)
+            let (ties, of) = (self.ties(rows)?, self.numbering);
+            amg::of_system(self.world, self.grid, of, rows, &ties, (self.unknowns, self.kind()))
         })
     }
 
     fn flow(&mut self, matrix: &mut Matrix) -> Result<Option<Flow>> {
-        if self.symmetric() {
+        if self.kind() != MatrixKind::Flowing {
             return Ok(None);
         }
         self.with_rows(matrix, |rows| {

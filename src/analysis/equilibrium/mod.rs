@@ -9,7 +9,7 @@ mod iteration;
 pub mod motion;
 mod ties;
 
-use crate::amg::Levels;
+use crate::amg::{Levels, MatrixKind};
 use crate::deck::model::InvertedIterates;
 use crate::error::Result;
 use crate::grid::Grid;
@@ -277,6 +277,15 @@ impl<'a, const D: usize, const N: usize> Equilibrium<'a, D, N> {
     /// Whether the tangents of all terms equal their transposed.
     pub fn symmetric(&self) -> bool {
         self.terms.iter().all(|term| term.symmetric())
+    }
+
+    /// What multigrid may expect of the tangent.
+    pub(super) fn kind(&self) -> MatrixKind {
+        match self.symmetric() {
+            true => MatrixKind::Symmetric,
+            false if self.terms.iter().any(|term| term.flows_unassociated()) => MatrixKind::Flowing,
+            false => MatrixKind::Unsymmetric,
+        }
     }
 
     /// The last iterate.

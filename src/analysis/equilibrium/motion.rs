@@ -15,7 +15,7 @@ pub fn terms<'a, const D: usize>(
     (frame, symmetric): (Frame, bool),
     mut further: Vec<Box<dyn Term<D> + 'a>>,
 ) -> Result<Vec<Box<dyn Term<D> + 'a>>> {
-    let stress = Stress { step: of.step, frame, symmetric };
+    let stress = Stress { step: of.step, frame, symmetric, associated: of.model.associated };
     let mut terms: Vec<Box<dyn Term<D> + 'a>> = vec![Box::new(stress)];
     if let Some(ghost) = Ghost::new(of.world, of.mesh)? {
         terms.push(Box::new(ghost));

@@ -25,13 +25,19 @@ pub struct Stress<'a, const D: usize> {
     pub step: StepPoints<'a, D>,
     /// The configuration that stresses and gradients refer to.
     pub frame: Frame,
-    /// The tangents of all materials are symmetric.
+    /// The equations are taken as symmetric.
     pub symmetric: bool,
+    /// The tangents of all materials are symmetric.
+    pub associated: bool,
 }
 
 impl<const D: usize> Term<D> for Stress<'_, D> {
     fn symmetric(&self) -> bool {
         self.symmetric
+    }
+
+    fn flows_unassociated(&self) -> bool {
+        !self.associated
     }
 
     fn add_shares(

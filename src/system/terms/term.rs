@@ -52,6 +52,12 @@ pub trait Term<const D: usize> {
         true
     }
 
+    /// Whether plastic flow that is not associated may make its tangent unsymmetric: multigrid then looks for
+    /// the nodes that flow.
+    fn flows_unassociated(&self) -> bool {
+        false
+    }
+
     /// This rank's shares: `force` of the local degrees of freedom, N, and the tangent, N/m, where
     /// there are `rows`.
     fn add_shares(
