@@ -134,6 +134,7 @@ impl Factors {
             (&format!("{inner}ksp_type"), "preonly"),
             (&format!("{inner}pc_type"), factorisation),
             (&format!("{inner}pc_factor_mat_solver_type"), package),
+            (&format!("{inner}{}", factors::ZERO_PIVOT.0), factors::ZERO_PIVOT.1),
         ])?;
         solver.set_from_options()?;
         solver.set_operators(&matrix)?;

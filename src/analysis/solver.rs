@@ -142,6 +142,7 @@ impl Linear {
                 ("telescope_ksp_type", "preonly"),
                 ("telescope_pc_type", "lu"),
                 ("telescope_pc_factor_mat_solver_type", package),
+                ("telescope_pc_factor_zeropivot", factors::ZERO_PIVOT.1),
                 ("snes_lag_preconditioner", "1"),
             ],
             Linear::DirectOnOne | Linear::Direct => &[
@@ -150,6 +151,7 @@ impl Linear {
                 ("ksp_rtol", "1e-8"),
                 ("pc_type", "lu"),
                 ("pc_factor_mat_solver_type", package),
+                factors::ZERO_PIVOT,
                 ("snes_lag_preconditioner", "1"),
             ],
             // The first iterate's hierarchy serves the whole step, unless it has become slow.

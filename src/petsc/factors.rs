@@ -6,6 +6,9 @@ use std::ptr::null_mut;
 use super::check::petsc;
 use super::sys;
 
+/// Only zero is a zero pivot. PETSc's own factors take one below 2.2e-14 for zero, in whatever units the matrix is.
+pub const ZERO_PIVOT: (&str, &str) = ("pc_factor_zeropivot", "0");
+
 /// PETSc's name for MUMPS.
 pub const MUMPS: &str = "mumps";
 /// PETSc's name for its own factors.

@@ -11,9 +11,9 @@ use mpi::traits::{Communicator, CommunicatorCollectives};
 use super::check::{petsc, text_of};
 use super::options::set_default;
 use super::product_matrix::{Product, ProductMatrix};
-use super::smoother;
 pub use super::smoother::Smoother;
 use super::{Ksp, Matrix, sys};
+use super::{factors, smoother};
 use crate::error::{Error, Result};
 
 /// A level with a smoother.
@@ -95,13 +95,16 @@ fn put_level<P: Product, S: Smoother>(
 fn put_coarsest(solver: &Ksp, pc: sys::PC, matrix: &Matrix) -> Result<()> {
     let coarse = petsc!(PCMGGetCoarseSolve(pc) -> null_mut())?;
     petsc!(KSPSetOperators(coarse, matrix.raw(), matrix.raw()))?;
+    let prefix = text_of(petsc!(KSPGetOptionsPrefix(coarse) -> null())?);
+    for inner in ["", "sub_", "redundant_"] {
+        set_default(&format!("{prefix}{inner}{}", factors::ZERO_PIVOT.0), factors::ZERO_PIVOT.1)?;
+    }
     let (comm, mut holders) = (solver.comm(), 0);
     comm.all_reduce_into(&i32::from(matrix.rows_local() > 0), &mut holders, SystemOperation::sum());
     if holders == 1 && comm.size() > 1 {
         let inner = petsc!(KSPGetPC(coarse) -> null_mut())?;
         petsc!(PCSetType(inner, sys::PCBJACOBI.as_ptr().cast()))?;
-        let prefix = petsc!(KSPGetOptionsPrefix(coarse) -> null())?;
-        set_default(&format!("{}sub_pc_type", text_of(prefix)), "lu")?;
+        set_default(&format!("{prefix}sub_pc_type"), "lu")?;
     }
     Ok(())
 }
