@@ -458,6 +458,35 @@ fn a_thick_cylinder_yields_as_hill_says() {
     assert!(stiff.iter().all(|e| *e < 0.003), "{stiff:?}");
 }
 
+/// Widening of the cavity's wall: of points near it, u r = A + B r^2 in the mean (least squares).
+fn widening(points: &PointTable) -> f64 {
+    let (mut sums, mut rights) = ([0.0; 3], [0.0; 2]);
+    let places = points.field("position_initial").chunks_exact(3);
+    for (x, u) in places.zip(points.field("displacement").chunks_exact(3)) {
+        let r = x[0].hypot(x[1]);
+        if r < 1.3 {
+            let (radial, basis) = ((x[0] * u[0] + x[1] * u[1]) / r, [1.0 / r, r]);
+            for (k, (row, column)) in [(0, 0), (0, 1), (1, 1)].into_iter().enumerate() {
+                sums[k] += basis[row] * basis[column];
+            }
+            (0..2).for_each(|k| rights[k] += basis[k] * radial);
+        }
+    }
+    let [a, b, c] = sums;
+    // A + B at the wall, r = 1.
+    ((c - b) * rights[0] + (a - b) * rights[1]) / (a * c - b * b)
+}
+
+#[test]
+#[ignore = "a minute and a half"]
+fn a_quarter_of_a_cavity_widens_as_the_whole() {
+    let results = Run::of("cavity-quarter").ranks(2).limit(900).results();
+    for (step, wide) in [(3, 0.01), (6, 0.05), (9, 0.1), (12, 0.2)] {
+        let found = widening(&results.points(step));
+        assert!((found / wide - 1.0).abs() < 0.01, "{found} for {wide}");
+    }
+}
+
 /// Nitsche's method at a tenth of the penalty is as exact as the penalty, and four times as exact as that
 /// penalty without it (measured at h = 1/20 of the height: 5.2e-3 for 4.3e-3 and 2.4e-2); wall forces are
 /// the weight in any case.
