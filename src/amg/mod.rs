@@ -199,7 +199,7 @@ pub fn build<const K: usize, const C: usize>(
 }
 
 /// As [`build`], under a matrix that need not be symmetric but has a symmetric pattern; where it `flows`, few nodes that
-/// do are solved together ([`flow`]). Collective.
+/// do are solved together ([`mod@flow`]). Collective.
 pub fn build_unsymmetric<const K: usize, const C: usize>(
     world: &World,
     nodes: &Nodes,

@@ -52,7 +52,7 @@ macro_rules! fields {
         /// A field of the points, named as in `output.fields`.
         #[derive(Debug, Clone, Copy, PartialEq)]
         pub enum PointField {
-            $( #[doc = concat!("`", $name, "`: ", $doc)] $variant, )*
+            $( #[doc = concat!("`", $name, "`")] $variant, )*
             /// A state variable of a material; zero where a point's material does not have it.
             State(StateVariable),
         }

@@ -46,7 +46,7 @@ impl PointField {
         }
     }
 
-    /// Appends the columns of this field at point `p`; integers of [`FieldRank::Integer`] fields
+    /// Appends the columns of this field at point `p`; integers of fields of whole numbers
     /// come from [`PointField::integer`] instead and appear here rounded to `f64`.
     pub fn append<const D: usize>(self, points: &Points<D>, p: usize, out: &mut Vec<f64>) {
         let jacobian = || points.deformation_gradient[p].determinant();
