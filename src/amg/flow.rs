@@ -12,7 +12,7 @@ use crate::error::Result;
 use crate::parallel::World;
 
 use super::block_smoother::{BlockSmoother, Cause};
-use super::level::{BlockCsr, Nodes, Rows};
+use super::level::{BlockCsr, Nodes, Rows, diagonal, inverted};
 use super::tied::block_of;
 
 /// A node flows where |A_i - S_i| exceeds this share of |A_ii|: its row, that of the symmetric part S, and its own
@@ -75,15 +75,7 @@ impl Flow {
         nodes: &Nodes,
         rows: &impl Rows<K>,
     ) -> Result<BlockSmoother> {
-        let mut inverse = vec![0.0; nodes.owned * K];
-        for (row, inverse) in inverse.chunks_exact_mut(K).enumerate() {
-            rows.visit(row, |column, block| {
-                if column == row {
-                    let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };
-                    (0..K).for_each(|k| inverse[k] = one_over(block[k][k]));
-                }
-            });
-        }
+        let inverse = inverted(diagonal(rows, nodes.owned));
         let few = self.share <= FEW && self.count * K <= MOST[usize::from(K > 2)];
         let block = match few {
             true => block_of(world, nodes, rows, &self.nodes, Cause::Flow)?,

@@ -53,6 +53,24 @@ pub trait Rows<const K: usize> {
     fn visit(&self, row: usize, see: impl FnMut(usize, &Block<K, K>));
 }
 
+/// The diagonal of the `owned` rows.
+pub fn diagonal<const K: usize>(rows: &impl Rows<K>, owned: usize) -> Vec<f64> {
+    let mut diagonal = vec![0.0; owned * K];
+    for (row, own) in diagonal.chunks_exact_mut(K).enumerate() {
+        rows.visit(row, |column, block| {
+            if column == row {
+                (0..K).for_each(|k| own[k] = block[k][k]);
+            }
+        });
+    }
+    diagonal
+}
+
+/// One over each value, zero where that is not positive.
+pub fn inverted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    values.into_iter().map(|value| if value > 0.0 { 1.0 / value } else { 0.0 }).collect()
+}
+
 /// Rows with values of their own.
 #[derive(Debug, Default)]
 pub struct BlockCsr<const K: usize> {

@@ -41,7 +41,7 @@ pub mod symmetric_part;
 pub mod tied;
 
 use crate::petsc::{Index, Product};
-use level::{Assembled, BlockCsr, Nodes, Rows};
+use level::{Assembled, BlockCsr, Nodes, Rows, diagonal, inverted};
 use symmetric_part::symmetric_part;
 
 use crate::blocks::{BlockProduct, Stored};
@@ -268,7 +268,7 @@ fn coarsen<const K: usize, const C: usize>(
     if aggregates.total == 0 || aggregates.total as f64 > how.most_left * all as f64 {
         return Ok(None);
     }
-    let inverse = inverse_diagonal(&product);
+    let inverse = inverted(product.diagonal());
     let largest = spectrum::largest::<K>(world, nodes, &product, &inverse)?;
     let lengths = Lengths::measured(world, nodes, &aggregates, length);
     let damping = if largest > 0.0 { DAMPING / largest } else { 0.0 };
@@ -294,12 +294,6 @@ fn coarsen<const K: usize, const C: usize>(
     Ok(Some((level, coarse, lengths.coarse)))
 }
 
-/// One over the diagonal, zero where that is not positive.
-fn inverse_diagonal(product: &BlockProduct<f32>) -> Vec<f64> {
-    let one_over = |value: f64| if value > 0.0 { 1.0 / value } else { 0.0 };
-    product.diagonal().into_iter().map(one_over).collect()
-}
-
 /// Gives a smoother's block of tied nodes the values of the symmetric `rows`. Collective.
 pub fn tie<const D: usize>(
     world: &World,
@@ -310,7 +304,9 @@ pub fn tie<const D: usize>(
 ) -> Result<()> {
     let nodes = nodes_of(numbering);
     let block = tied::block_of(world, &nodes, rows, tied, Cause::Ties)?;
-    smoother.renew(inverse_diagonal(&product(&nodes, rows)), block.as_ref())
+    // Rounded as in the level's own product.
+    let rounded = diagonal(rows, nodes.owned).into_iter().map(|value| f64::from(value as f32));
+    smoother.renew(inverted(rounded), block.as_ref())
 }
 
 /// The nodes that flow under the unsymmetric `rows`. Collective.

@@ -84,14 +84,12 @@ pub(crate) fn advance<const D: usize>(
     };
     let counter = release::counter_force(model, &mesh, points, (span.stage, span.factor_start));
     let counter = release::owned(world, &mesh, counter)?;
-    match pressed.is_empty() {
-        true => pressed = counter,
-        false => add(&mut pressed, 1.0, &counter),
-    }
     let exerted = declaration::exerted(Context::new(world, model, (&mesh, points), span), None)?;
-    match pressed.is_empty() {
-        true => pressed.clone_from(&exerted),
-        false => add(&mut pressed, 1.0, &exerted),
+    for force in [&counter, &exerted] {
+        match pressed.is_empty() {
+            true => pressed.clone_from(force),
+            false => add(&mut pressed, 1.0, force),
+        }
     }
     let borne = supports_at_start(model, &mesh, points, span);
     let mut pushing = contact.begin(world, model, &mesh, points, span)?;
